@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The grid of square cells that all parts of a living map share, and rectangles of its cells."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
+
+SAME_PLACE = 1e-6
+"""Distance from the centre of a cell at which its height alone counts [cells]."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +31,25 @@ class CellGrid:
         """Return x and y of the centres of cells [m]; their numbers may be fractions."""
         x, y = self.anchor
         return x + self.resolution * columns, y + self.resolution * rows
+
+    def centres_of(self, box: "CellBox") -> tuple[Any, Any]:
+        """Return x (columns,) and y (rows, 1) of the centres of a box of cells [m]."""
+        rows = (box.row + np.arange(box.rows))[:, None]
+        return self.places(box.column + np.arange(box.columns), rows)
+
+    def box_around(self, middle: Floats, half: Floats, yaw: float = 0.0) -> "CellBox":
+        """Return the cells with their centres in the upright rectangle around a turned one.
+
+        Args:
+            middle: (2,) middle of the turned rectangle [m].
+            half: (2,) half of its length and width [m].
+            yaw: Angle of its length from x [rad].
+        """
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        reach = np.abs([[cosine, sine], [sine, cosine]]) @ half
+        column, row = (math.ceil(one - SAME_PLACE) for one in self.coordinates(*(middle - reach)))
+        last = [math.floor(one + SAME_PLACE) for one in self.coordinates(*(middle + reach))]
+        return CellBox.between((row, column), (last[1] + 1, last[0] + 1))
 
 
 def grid_of(terrain: Terrain) -> CellGrid:

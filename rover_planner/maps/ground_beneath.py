@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.prediction.evaluation import new_work
-from rover_physics.rover.linkage import pack_linkage, place
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.records import new_record
+from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.model import Rover
-from rover_planner.maps.cells import CellBox, CellGrid
+from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.layers import Patch
 
 CONTACT_LENGTH = 0.25
@@ -24,8 +25,6 @@ EDGE_CELLS = 1.5
 """Width beyond the wheels' outline that interpolation between cells needs [cells]."""
 SAME_PLACE = 2e-3
 """Change of each part of pose and suspension up to which a rover stands as before [m, rad]."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,12 +63,12 @@ class GroundBeneath:
     linear across. Beyond the wheels it goes on with the mean slope of each side.
     """
 
-    pose: tuple[float, float, float]
-    """x, y [m] and yaw [rad] of the body, map frame."""
+    pose: Floats
+    """(3,) x, y [m] and yaw [rad] of the body, map frame."""
     contacts: Floats
     """(6, 3) points on which the wheels stand [m], map frame."""
-    outline: tuple[float, float, float, float]
-    """Smallest and largest x and y of the wheels seen from above [m], body axes turned by yaw."""
+    outline: Floats
+    """(2, 2) smallest and largest x, y of the wheels seen from above [m], axes turned by yaw."""
     half_width: float
     """Half of a wheel's width [m]."""
     contact_length: float
@@ -86,22 +85,14 @@ class GroundBeneath:
             std: Standard deviation of the heights [m].
         """
         beyond = margin + EDGE_CELLS * grid.resolution
-        x0, x1, y0, y1 = self.outline
-        corners = np.array([(x, y) for x in (x0 - beyond, x1 + beyond)
-                            for y in (y0 - beyond, y1 + beyond)])  # fmt: skip
-        c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
-        column, row = grid.coordinates(
-            self.pose[0] + c * corners[:, 0] - s * corners[:, 1],
-            self.pose[1] + s * corners[:, 0] + c * corners[:, 1],
-        )
-        low = int(np.floor(row.min())), int(np.floor(column.min()))
-        high = int(np.ceil(row.max())) + 1, int(np.ceil(column.max())) + 1
-        box = CellBox.between(low, high)
-        columns, rows = np.arange(box.columns, dtype=float), np.arange(box.rows, dtype=float)
-        x, y = grid.places(box.column + columns, box.row + rows)
-        along, across = _to_body(self.pose, x[None, :], y[:, None])
-        inside = (along >= x0 - beyond) & (along <= x1 + beyond)
-        inside &= (across >= y0 - beyond) & (across <= y1 + beyond)
+        low, high = self.outline[0] - beyond, self.outline[1] + beyond
+        x, y, yaw = self.pose
+        c, s = np.cos(yaw), np.sin(yaw)
+        middle = np.array([x, y]) + np.array([[c, -s], [s, c]]) @ (0.5 * (low + high))
+        box = grid.box_around(middle, 0.5 * (high - low), yaw)
+        along, across = _to_body(self.pose, *grid.centres_of(box))
+        inside = (along >= low[0]) & (along <= high[0])
+        inside &= (across >= low[1]) & (across <= high[1])
         heights = np.where(inside, self._height(along, across), np.nan)
         is_contact = inside & self._is_contact(along, across)
         layers = {"elevation": heights, "elevation_std": np.where(inside, std, np.nan)}
@@ -121,12 +112,9 @@ class GroundBeneath:
 
     def _is_contact(self, along: Floats, across: Floats) -> NDArray[np.bool_]:
         ahead, aside = _to_body(self.pose, *self.contacts[:, :2].T)
-        near = np.zeros(np.broadcast_shapes(along.shape, across.shape), bool)
-        for x, y in zip(ahead, aside, strict=True):
-            near |= (np.abs(along - x) <= self.contact_length) & (
-                np.abs(across - y) <= self.half_width
-            )
-        return near
+        near = np.abs(along[..., None] - ahead) <= self.contact_length
+        near &= np.abs(across[..., None] - aside) <= self.half_width
+        return np.asarray(near.any(axis=-1))
 
 
 def find_ground_beneath(rover: Rover, standing: Standing) -> GroundBeneath:
@@ -139,32 +127,26 @@ def find_ground_beneath(rover: Rover, standing: Standing) -> GroundBeneath:
         rover: The rover.
         standing: What was measured.
     """
-    work = new_work()
     angles = [standing.suspension[name] for name in SUSPENSION_JOINTS]
     # The differential mirrors the rockers; the mean of both measurements is used.
     rocker = 0.5 * (angles[0] - angles[1])
     q = np.array([standing.z, standing.roll, standing.pitch, rocker, angles[2], angles[3]])
     pose = np.array([standing.x, standing.y, standing.yaw])
-    placement = work.placement
+    placement = new_record(PLACEMENT)
     place(pack_linkage(rover), pose, q, placement)
     centres = np.array(placement.centres)
     normal = _normal_of(centres)
     axle = np.array(placement.R)[:, 1]
     down = normal - (normal @ axle) * axle
     contacts = centres - rover.wheel.radius * down / np.linalg.norm(down)
-    here = standing.x, standing.y, standing.yaw
-    along, across = _to_body(here, *centres[:, :2].T)
+    centres_here = np.stack(_to_body(pose, *centres[:, :2].T))
     half, radius = 0.5 * rover.wheel.width, rover.wheel.radius
-    outline = (
-        float(along.min() - radius),
-        float(along.max() + radius),
-        float(across.min() - half),
-        float(across.max() + half),
-    )
-    return GroundBeneath(here, contacts, outline, half, CONTACT_LENGTH * radius)
+    reach = np.array([radius, half])
+    outline = np.stack([centres_here.min(axis=1) - reach, centres_here.max(axis=1) + reach])
+    return GroundBeneath(pose, contacts, outline, half, CONTACT_LENGTH * radius)
 
 
-def _to_body(pose: tuple[float, float, float], x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def _to_body(pose: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return points [m] of the map along and across a body at x, y [m] and yaw [rad]."""
     dx, dy, c, s = x - pose[0], y - pose[1], np.cos(pose[2]), np.sin(pose[2])
     return c * dx + s * dy, c * dy - s * dx

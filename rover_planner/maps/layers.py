@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Layers of a rectangle of cells: grown, moved, written, and laid onto other cells."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msg_adapters.gridding import most_frequent
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
-from rover_planner.maps.cells import CellBox, CellGrid, grid_of
+from rover_planner.maps.cells import SAME_PLACE, CellBox, CellGrid, grid_of
 from rover_planner.maps.changes import LAYERS
 
 MAX_OFF_CENTRE = 0.02
@@ -18,8 +18,6 @@ MAX_OFF_CENTRE = 0.02
 is taken without interpolation [cells]."""
 MAX_FINER = 0.5
 """Size of a map's cells relative to the grid's below which several of them share a cell."""
-SAME_PLACE = 1e-6
-"""Distance from the centre of a cell at which its height alone counts [cells]."""
 UNKNOWN, LOADED, CONTACT, FOOTPRINT = range(4)
 """Sources of cells: none, a loaded map, a wheel that stands there, and the ground assumed between
 and around the wheels. Higher numbers are topics."""
@@ -43,7 +41,6 @@ LASTING = ("friction", "ground_class")
 """Layers whose values stay where a newer map has none, and are never interpolated."""
 
 Layer = NDArray[Any]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +71,6 @@ class Patch:
 
     def moved_to(self, box: CellBox) -> "Patch":
         """Return the layers over another box; cells that this one lacks are empty."""
-        if box == self.box:
-            return self
         moved = empty_patch(box, tuple(self.layers))
         to, source = self.box.within(box), box.within(self.box)
         for name, layer in self.layers.items():
@@ -126,13 +121,14 @@ def empty_patch(box: CellBox, names: tuple[str, ...] = ALWAYS) -> Patch:
     return Patch(box, layers)
 
 
-_Lay = Callable[[Terrain, CellGrid, CellBox], Patch]
-"""Lays a map onto the cells of a box."""
-
-
 def box_on(terrain: Terrain, grid: CellGrid) -> CellBox:
     """Return the cells of a grid onto which `lay_onto` lays a map."""
-    return _place_on(terrain, grid)[1]
+    if _is_on(terrain, grid) or _is_finer(terrain, grid):
+        rows, columns = _cells_of(terrain, grid)
+        low, high = (int(rows[0]), int(columns[0])), (int(rows[-1]) + 1, int(columns[-1]) + 1)
+        return CellBox.between(low, high)
+    x0, x1, y0, y1 = terrain.bounds
+    return grid.box_around(np.array([x0 + x1, y0 + y1]) / 2.0, np.array([x1 - x0, y1 - y0]) / 2.0)
 
 
 def lay_onto(terrain: Terrain, grid: CellGrid, within: CellBox | None = None) -> Patch:
@@ -149,29 +145,26 @@ def lay_onto(terrain: Terrain, grid: CellGrid, within: CellBox | None = None) ->
         within: Cells that are wanted; others are left out where they would be interpolated, as
             they may be many times those of the map.
     """
-    lays, box = _place_on(terrain, grid)
-    return lays(
-        terrain, grid, box if within is None or lays is not _interpolate else box.cut(within)
-    )
+    box = box_on(terrain, grid)
+    if _is_on(terrain, grid):
+        return Patch(box, layers_of(terrain))
+    if _is_finer(terrain, grid):
+        return _combine(terrain, grid, box)
+    box = box if within is None else box.cut(within)
+    places = grid_of(terrain).coordinates(*grid.centres_of(box))
+    return Patch(box, sample_layers(terrain, *places))
 
 
-def _place_on(terrain: Terrain, grid: CellGrid) -> tuple[_Lay, CellBox]:
-    """Return how a map is laid onto a grid, and the cells that it takes there."""
-    column, row = grid.coordinates(*terrain.origin)
-    ny, nx = terrain.elevation.shape
-    ratio = terrain.resolution / grid.resolution
-    first = round(row), round(column)
-    drift = abs(ratio - 1.0) * max(ny, nx)
-    if max(abs(row - first[0]), abs(column - first[1])) + drift <= MAX_OFF_CENTRE:
-        return _copy, CellBox(*first, ny, nx)
-    if ratio < MAX_FINER:
-        rows, columns = _cells_of(terrain, grid)
-        low, high = (int(rows[0]), int(columns[0])), (int(rows[-1]) + 1, int(columns[-1]) + 1)
-        return _combine, CellBox.between(low, high)
-    ends = row + (ny - 1) * ratio, column + (nx - 1) * ratio
-    low = int(np.ceil(row - 1e-6)), int(np.ceil(column - 1e-6))
-    high = int(np.floor(ends[0] + 1e-6)) + 1, int(np.floor(ends[1] + 1e-6)) + 1
-    return _interpolate, CellBox.between(low, high)
+def _is_on(terrain: Terrain, grid: CellGrid) -> bool:
+    """Return whether the cells of a map are those of a grid."""
+    off = [abs(value - round(value)) for value in grid.coordinates(*terrain.origin)]
+    drift = abs(terrain.resolution / grid.resolution - 1.0) * max(terrain.elevation.shape)
+    return max(off) + drift <= MAX_OFF_CENTRE
+
+
+def _is_finer(terrain: Terrain, grid: CellGrid) -> bool:
+    """Return whether several cells of a map share one of a grid."""
+    return terrain.resolution / grid.resolution < MAX_FINER
 
 
 def _cells_of(terrain: Terrain, grid: CellGrid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -185,16 +178,6 @@ def layers_of(terrain: Terrain) -> dict[str, Layer]:
     """Return the layers that a terrain has, by name."""
     layers = {name: getattr(terrain, name) for name in LAYERS}
     return {name: layer for name, layer in layers.items() if layer is not None}
-
-
-def _copy(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
-    return Patch(box, layers_of(terrain))
-
-
-def _interpolate(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
-    rows = (box.row + np.arange(box.rows))[:, None]
-    places = grid.places(box.column + np.arange(box.columns), rows)
-    return Patch(box, sample_layers(terrain, *grid_of(terrain).coordinates(*places)))
 
 
 def sample_layers(terrain: Terrain, column: Floats, row: Floats) -> dict[str, Layer]:
@@ -239,18 +222,13 @@ def _bracket(
 def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
     rows, columns = _cells_of(terrain, grid)
     at = (rows - box.row)[:, None], (columns - box.column)[None, :]
-    layers: dict[str, Layer] = {}
-    combined: Layer
+    combined = empty_patch(box, tuple(layers_of(terrain)))
     for name, layer in layers_of(terrain).items():
-        if name == "soil":
-            combined = np.full((box.rows, box.columns), -1, np.int32)
-            np.maximum.at(combined, at, layer)
-        elif name == "ground_class":
-            cells = np.ravel_multi_index(np.broadcast_arrays(*at), (box.rows, box.columns))
-            combined = most_frequent(cells.ravel(), layer.ravel(), box.cells)
-            combined = combined.reshape(box.rows, box.columns)
+        into = combined.layers[name]
+        if name == "ground_class":
+            cells = np.ravel_multi_index(np.broadcast_arrays(*at), into.shape)
+            found = most_frequent(cells.ravel(), layer.ravel(), box.cells)
+            into[:] = found.reshape(into.shape)
         else:
-            combined = np.full((box.rows, box.columns), np.nan)
-            (np.fmin if name == "friction" else np.fmax).at(combined, at, layer)
-        layers[name] = combined
-    return Patch(box, layers)
+            (np.fmin if name == "friction" else np.fmax).at(into, at, layer)
+    return combined

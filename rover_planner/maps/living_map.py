@@ -7,6 +7,7 @@ stay. Each cell knows its source and its time.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from rover_physics.numerics.arrays import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
+from rover_planner.maps.changes import LAYERS
 from rover_planner.maps.layers import (
     CONTACT,
     FIRST_NAMES,
@@ -59,21 +61,18 @@ class LivingMap:
         self._names = list(FIRST_NAMES)
         self._last: dict[str, float] = {}
         self._rolls = False
-        self._loaded: Terrain | None = None
+        self.loaded: Terrain | None = None
+        """The loaded map; None without one."""
         self._loaded_time = 0.0
-        self._grid: CellGrid | None = None
+        self.grid: CellGrid | None = None
+        """The cells; None before the first map."""
         self._window: Patch | None = None
         self._whole: Terrain | None = None
-
-    @property
-    def has_loaded(self) -> bool:
-        """True if there is a loaded map."""
-        return self._loaded is not None
 
     def load(self, terrain: Terrain, time: float) -> None:
         """Start over with a loaded map; time [s] is that of its loading."""
         self._clear(terrain)
-        self._loaded, self._loaded_time = terrain, time
+        self.loaded, self._loaded_time = terrain, time
         patch = lay_onto(terrain, grid_of(terrain))
         self._window = self._with_loaded(empty_patch(patch.box))
         self._whole = terrain if self._std_to_add() == 0.0 else None
@@ -103,11 +102,11 @@ class LivingMap:
         Raises:
             PlanningError: The window would be too large; all stays as it was.
         """
-        before = self._grid, self._window, self._rolls
+        before = self.grid, self._window, self._rolls
         try:
             window, patch = self._lay(terrain, centre)
         except PlanningError:
-            self._grid, self._window, self._rolls = before
+            self.grid, self._window, self._rolls = before
             raise
         if time < self._last.get(source, time):
             layers = window.layers | {"time": np.minimum(window.layers["time"], time)}
@@ -119,15 +118,16 @@ class LivingMap:
 
     def _lay(self, terrain: Terrain, centre: tuple[float, float] | None) -> tuple[Patch, Patch]:
         """Return a window with room for a local map, and the map on its cells."""
-        if self.grid_for(terrain) is None:
-            self._grid, self._window = grid_of(terrain), None
-        assert self._grid is not None
+        grid = self.grid_for(terrain)
+        if grid is None:
+            grid = grid_of(terrain)
+            self.grid, self._window = grid, None
         self._rolls = self.values.map_window > 0.0
         if centre is None:
             x0, x1, y0, y1 = terrain.bounds
             centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-        window = self._room_for(box_on(terrain, self._grid), centre)
-        return window, lay_onto(terrain, self._grid, window.box)
+        window = self._room_for(box_on(terrain, grid), centre)
+        return window, lay_onto(terrain, grid, window.box)
 
     def fill(self, patch: Patch, is_contact: Layer, time: float) -> bool:
         """Fill cells under the rover; return whether any changed.
@@ -141,9 +141,7 @@ class LivingMap:
             is_contact: (rows, columns) of the patch: True where a wheel stands.
             time: Time of the measurement [s].
         """
-        if self._window is None:
-            return False
-        if not self._is_near(patch.box):
+        if self._window is None or not self._is_near(patch.box, self._window.box):
             return False
         window = self._room_for(patch.box, self._centre_of(patch.box))
         to, own = patch.box.within(window.box), window.box.within(patch.box)
@@ -161,42 +159,31 @@ class LivingMap:
         self._window, self._whole = window, None
         return True
 
-    @property
-    def grid(self) -> CellGrid | None:
-        """The cells; None before the first map."""
-        return self._grid
-
     def snapshot(self) -> MapSnapshot | None:
         """Return the map as it is now; None before the first one.
 
         Raises:
             TerrainError: No cell of the window is known.
         """
-        if self._window is None or self._grid is None:
+        if self._window is None or self.grid is None:
             return None
         box, layers = self._window.box, self._window.layers
         for layer in layers.values():
             seal_array(layer)
         if self._whole is None:
-            soils = () if self._loaded is None else self._loaded.soil_names
-            self._whole = Terrain(
-                layers["elevation"],
-                self._grid.resolution,
-                self._grid.places(box.column, box.row),
-                layers.get("friction"),
-                layers.get("soil"),
-                soils if "soil" in layers else (),
-                layers.get("elevation_std"),
-                layers.get("ground_class"),
-            )
+            grids: dict[str, Any] = {name: layers[name] for name in LAYERS if name in layers}
+            if self.loaded is not None and "soil" in layers:
+                grids["soil_names"] = self.loaded.soil_names
+            origin = self.grid.places(box.column, box.row)
+            self._whole = Terrain(**grids, resolution=self.grid.resolution, origin=origin)
         sources = CellSources(layers["source"], layers["time"], tuple(self._names))
         return MapSnapshot(self._whole, sources)
 
     def _clear(self, terrain: Terrain) -> None:
         self._last.clear()
         self._rolls = False
-        self._loaded, self._window, self._whole = None, None, None
-        self._grid = grid_of(terrain)
+        self.loaded, self._window, self._whole = None, None, None
+        self.grid = grid_of(terrain)
 
     def _index_of(self, source: str) -> int:
         if source not in self._names:
@@ -204,7 +191,7 @@ class LivingMap:
         return self._names.index(source)
 
     def _std_to_add(self) -> float:
-        has_std = self._loaded is None or self._loaded.elevation_std is not None
+        has_std = self.loaded is None or self.loaded.elevation_std is not None
         return 0.0 if has_std else self.values.loaded_std
 
     def grid_for(self, terrain: Terrain) -> CellGrid | None:
@@ -213,12 +200,12 @@ class LivingMap:
         The first map sets them, and a first local one that is finer than the loaded one.
         """
         is_finer = (
-            self._grid is not None
-            and self._loaded is not None
+            self.grid is not None
+            and self.loaded is not None
             and not self._last
-            and terrain.resolution < FINER * self._grid.resolution
+            and terrain.resolution < FINER * self.grid.resolution
         )
-        return None if is_finer else self._grid
+        return None if is_finer else self.grid
 
     def _room_for(self, box: CellBox, centre: tuple[float, float]) -> Patch:
         """Return the window with room for a box, or around a place of the rover [m]."""
@@ -228,8 +215,8 @@ class LivingMap:
             most = self.values.max_map_cells
             advice = "set map_window to the side of a window around the rover"
             if self._rolls:
-                assert self._grid is not None
-                side = math.isqrt(most) * self._grid.resolution
+                assert self.grid is not None
+                side = math.isqrt(most) * self.grid.resolution
                 advice = (
                     f"map_window is {self.values.map_window:g} m, set it to at most {side:.4g} m"
                 )
@@ -240,14 +227,14 @@ class LivingMap:
         if old is not None and old.box == wanted:
             return old
         moved = empty_patch(wanted) if old is None else old.moved_to(wanted)
-        return moved if self._loaded is None else self._with_loaded(moved)
+        return moved if self.loaded is None else self._with_loaded(moved)
 
     def _wanted_box(self, box: CellBox, centre: tuple[float, float]) -> CellBox:
-        assert self._grid is not None
+        assert self.grid is not None
         old = None if self._window is None else self._window.box
         if self._rolls:
-            n = max(2, round(self.values.map_window / self._grid.resolution))
-            column, row = (round(value) - n // 2 for value in self._grid.coordinates(*centre))
+            n = max(2, round(self.values.map_window / self.grid.resolution))
+            column, row = (round(value) - n // 2 for value in self.grid.coordinates(*centre))
             is_kept = (
                 old is not None
                 and (old.rows, old.columns) == (n, n)
@@ -255,8 +242,8 @@ class LivingMap:
             )
             return old if is_kept and old is not None else CellBox(row, column, n, n)
         if old is None:
-            loaded = self._loaded
-            return box if loaded is None else box_on(loaded, self._grid).union(box)
+            loaded = self.loaded
+            return box if loaded is None else box_on(loaded, self.grid).union(box)
         if old.contains(box):
             return old
         union = old.union(box)
@@ -274,8 +261,8 @@ class LivingMap:
 
     def _with_loaded(self, window: Patch) -> Patch:
         """Return a window whose unknown cells are those of the loaded map."""
-        assert self._loaded is not None and self._grid is not None
-        patch = lay_onto(self._loaded, self._grid, window.box)
+        assert self.loaded is not None and self.grid is not None
+        patch = lay_onto(self.loaded, self.grid, window.box)
         std = self._std_to_add()
         if std > 0.0:
             known = np.isfinite(patch.layers["elevation"])
@@ -299,25 +286,24 @@ class LivingMap:
         is_given = (source == UNKNOWN) | (source == CONTACT) | (source == FOOTPRINT)
         if self.values.map_merge == NEWEST:
             return known & (is_given | (source == LOADED) | (since <= time))
-        old = window.layers.get("elevation_std")
-        old = np.zeros(known.shape) if old is None else old[to]
-        new = patch.layers.get("elevation_std")
-        new = np.zeros(known.shape) if new is None else new[own]
+        old, new = (
+            one.with_layers(("elevation_std",)).layers["elevation_std"][cells]
+            for one, cells in ((window, to), (patch, own))
+        )
         age = np.where(np.isfinite(since), np.maximum(time - since, 0.0), 0.0)
         with np.errstate(invalid="ignore"):
             surer = new <= np.hypot(old, self.values.map_ageing * age)
         return known & (is_given | surer)
 
-    def _is_near(self, box: CellBox) -> bool:
-        """Return whether a window that grows to a box stays of the size of both."""
-        if self._rolls or self._window is None:
+    def _is_near(self, box: CellBox, old: CellBox) -> bool:
+        """Return whether a window that grows from the old one to a box stays of their size."""
+        if self._rolls or old.contains(box):
             return True
-        old = self._window.box
         grown = self._wanted_box(box, self._centre_of(box)).cells
         most = NEAR * (old.cells + box.cells) + GROWTH**2
-        return grown <= (old.cells if grown == old.cells else min(most, self.values.max_map_cells))
+        return grown <= min(most, self.values.max_map_cells)
 
     def _centre_of(self, box: CellBox) -> tuple[float, float]:
-        assert self._grid is not None
+        assert self.grid is not None
         centre = box.column + 0.5 * (box.columns - 1), box.row + 0.5 * (box.rows - 1)
-        return self._grid.places(*centre)
+        return self.grid.places(*centre)

@@ -4,7 +4,6 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 from urllib.parse import unquote, urlparse
@@ -25,38 +24,30 @@ class MapFileError(PlanningError):
     """A name that is no readable file below the folder; the text names file and reason."""
 
 
-@dataclass(frozen=True)
-class MapLimits:
-    """Limits of the files that a client may load."""
-
-    folder: str = "/"
-    """Folder that the file must be below; symbolic links that lead out of it are refused."""
-    max_bytes: int = 1_000_000_000
-    """Largest file [bytes]."""
-    max_cells: int = MAX_CELLS
-    """Largest map [cells]."""
-
-
-def open_map(url: str, limits: MapLimits) -> Terrain:
+def open_map(
+    url: str, folder: str = "/", max_bytes: int = 1_000_000_000, max_cells: int = MAX_CELLS
+) -> Terrain:
     """Load the terrain file that a client names.
 
     Args:
         url: A path, or a file:// URL with %-escapes. Relative paths start at the folder.
-        limits: What may be loaded.
+        folder: Folder that the file must be below; links that lead out of it are refused.
+        max_bytes: Size of the largest file [bytes].
+        max_cells: Size of the largest map [cells].
 
     Raises:
         MapFileError: The URL is none of a local file; the file does not exist, is not below the
             folder, is not a regular file, or cannot be read.
         TerrainError: The file is too large, or not a terrain file.
     """
-    with errors_of(url, MapFileError), _open_below(file_of_url(url), limits.folder) as file:
+    with errors_of(url, MapFileError), _open_below(file_of_url(url), folder) as file:
         size = os.fstat(file.fileno()).st_size
-        if size > limits.max_bytes:
+        if size > max_bytes:
             raise TerrainError(
                 f"{show_file(url)}: the file has {size} bytes; the limit (max_map_bytes) is "
-                f"{limits.max_bytes}"
+                f"{max_bytes}"
             )
-        return read_terrain(file, show_file(url), limits.max_cells)
+        return read_terrain(file, show_file(url), max_cells)
 
 
 def file_of_url(url: str) -> Path:

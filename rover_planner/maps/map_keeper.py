@@ -24,7 +24,7 @@ class MapKeeper:
     def merges(self) -> bool:
         """True if the next local map merges."""
         updates = self._living.values.map_updates
-        return updates == MERGE or (updates == AUTO and self._living.has_loaded)
+        return updates == MERGE or (updates == AUTO and self._living.loaded is not None)
 
     def load(self, terrain: Terrain, time: float, standing: Standing | None) -> MapSnapshot:
         """Start over with a loaded map.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.numerics.arrays import seal_array
+from rover_physics.numerics.arrays import Floats, seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
@@ -18,8 +18,7 @@ from rover_planner.maps.cells import CellBox, CellGrid, grid_of
 from rover_planner.maps.layers import (
     MAX_FINER,
     MAX_OFF_CENTRE,
-    SAME_PLACE,
-    Floats,
+    empty_patch,
     layers_of,
     sample_layers,
 )
@@ -95,25 +94,25 @@ def _lay_turned(
     terrain: Terrain, middle: Floats, yaw: float, grid: CellGrid, max_cells: int
 ) -> Terrain:
     """Lay a map that is turned by a yaw [rad] about its middle (2,) [m] onto a grid."""
-    turn = math.cos(yaw), math.sin(yaw)
-    box = _find_box(terrain, middle, turn, grid)
+    ny, nx = terrain.elevation.shape
+    half = 0.5 * terrain.resolution * np.array([nx - 1, ny - 1])
+    box = grid.box_around(middle, half, yaw)
     if box.cells > max_cells:
         raise PlanningError(
             f"the map turned into its frame would have {box.rows} x {box.columns} cells; "
             f"at most {max_cells} are taken"
         )
-    own, (ny, nx) = replace(terrain, soil=None, soil_names=()), terrain.elevation.shape
-    laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers_of(own)}
-    band = max(BAND_CELLS // max(box.columns, 1), 1)
+    own = replace(terrain, soil=None, soil_names=())
+    laid = empty_patch(box, tuple(layers_of(own))).layers
+    turn, band = (math.cos(yaw), math.sin(yaw)), max(BAND_CELLS // max(box.columns, 1), 1)
     for first in range(0, box.rows, band):
-        rows = slice(first, min(first + band, box.rows))
-        columns, lines = np.arange(box.columns), np.arange(rows.start, rows.stop)[:, None]
-        x, y = grid.places(box.column + columns, box.row + lines)
+        count = min(band, box.rows - first)
+        x, y = grid.centres_of(CellBox(box.row + first, box.column, count, box.columns))
         dx, dy = (x - middle[0]) / terrain.resolution, (y - middle[1]) / terrain.resolution
         column = turn[0] * dx + turn[1] * dy + 0.5 * (nx - 1)
         row = turn[0] * dy - turn[1] * dx + 0.5 * (ny - 1)
         for name, layer in sample_layers(own, column, row).items():
-            laid[name][rows] = layer
+            laid[name][first : first + count] = layer
     if not np.isfinite(laid["elevation"]).any():
         raise PlanningError(
             "the map is turned against its cells, and none of them has four known ones around"
@@ -121,17 +120,3 @@ def _lay_turned(
     sealed: dict[str, Any] = {name: seal_array(layer) for name, layer in laid.items()}
     origin = grid.places(box.column, box.row)
     return Terrain(**sealed, resolution=grid.resolution, origin=origin)
-
-
-def _find_box(
-    terrain: Terrain, middle: Floats, turn: tuple[float, float], grid: CellGrid
-) -> CellBox:
-    """Return the cells of a grid around a turned map; `turn` are cosine and sine of its yaw."""
-    ny, nx = terrain.elevation.shape
-    half = 0.5 * terrain.resolution * np.array([nx - 1, ny - 1])
-    cosine, sine = turn
-    extent = np.abs([[cosine, -sine], [sine, cosine]]) @ half
-    low, high = (grid.coordinates(*(middle + sign * extent)) for sign in (-1.0, 1.0))
-    column, row = (math.ceil(value - SAME_PLACE) for value in low)
-    last_column, last_row = (math.floor(value + SAME_PLACE) for value in high)
-    return CellBox.between((row, column), (last_row + 1, last_column + 1))

@@ -20,7 +20,7 @@ from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
 from rover_planner.maps.known_map import KnownMap, describe_terrain
-from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
+from rover_planner.maps.map_file import MapFileError, open_map
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
@@ -119,8 +119,8 @@ class MapTopics(MapIntake):
         """Take the map of a file and fill the response."""
         try:
             values = self.values
-            limits = MapLimits(values.map_folder, values.max_map_bytes, values.max_map_cells)
-            terrain = open_map(url, limits)
+            limits = values.map_folder, values.max_map_bytes, values.max_map_cells
+            terrain = open_map(url, *limits)
             standing, now = self._service.standing(), self._node.seconds
             snapshot = self._inputs.keeper.load(terrain, now, standing)
         except RoverError as error:

@@ -52,7 +52,7 @@ def test_a_loaded_map_alone_is_the_terrain_itself():
     only = local_map((0.0, 0.0), 0.1)
     living.replace(only, TOPIC, 1.0)
     now = living.snapshot()
-    assert now.terrain is only and not living.has_loaded
+    assert now.terrain is only and living.loaded is None
     assert UNKNOWN not in now.sources.source
 
 

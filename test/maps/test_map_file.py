@@ -8,7 +8,7 @@ import pytest
 
 from rover_physics import save_terrain
 from rover_physics.errors import TerrainError
-from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
+from rover_planner.maps.map_file import MapFileError, open_map
 from support.grounds import make_terrain, waves
 
 
@@ -23,7 +23,7 @@ def maps(tmp_path):
 
 
 def load(maps, name, **limits):
-    return open_map(name, MapLimits(str(maps), **limits))
+    return open_map(name, str(maps), **limits)
 
 
 def test_a_path_and_a_url_below_the_folder_are_read(maps):
@@ -94,7 +94,7 @@ def test_a_link_that_replaces_a_part_after_the_check_is_not_followed(maps, monke
 )  # fmt: skip
 def test_what_names_no_file_is_refused_in_one_short_line(url):
     with pytest.raises(MapFileError) as raised:
-        open_map(url, MapLimits())
+        open_map(url)
     assert len(str(raised.value)) <= 400
     assert str(raised.value).isprintable()
 
