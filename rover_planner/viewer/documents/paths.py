@@ -8,12 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.plain_values import to_plain
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.studies.rover_values import RoverValue, get_value, list_values
@@ -211,7 +212,7 @@ def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str,
     """
     rows = choose_rows(values)
     y = np.where(np.isposinf(values[rows]), MAX_USE, values[rows]).T
-    return {"x": plain(distance[rows], 4), "y": plain(y, digits)}
+    return {"x": to_plain(np.round(distance[rows], 4)), "y": to_plain(np.round(y, digits))}
 
 
 def choose_rows(values: Floats) -> NDArray[np.intp]:
@@ -250,11 +251,11 @@ def describe_board(state: RoverState | None, failing: str = "") -> dict[str, Any
         wheels.append(
             {
                 "name": name.replace("_", " "),
-                "bars": [[title, plain(use), write_use(use)] for title, use in bars],
+                "bars": [[title, to_plain(round(use, 3)), write_use(use)] for title, use in bars],
                 "colour": to_css(colour_use(friction)),
                 "load": write(float(state.wheel_loads[k]), 1, "N"),
                 "slip": write(100.0 * slip, 0, "% slip") if slips else "",
-                "turn": plain(math.degrees(float(state.steering_angle[k])), 1),
+                "turn": to_plain(np.round(np.degrees(state.steering_angle[k]), 1)),
                 "fails": failing == name,
             }
         )
@@ -363,18 +364,6 @@ def compare_drives(before: Judged, now: Judged) -> list[list[str]]:
 
 
 # Numbers.
-
-
-def plain(values: ArrayLike, digits: int = 3) -> Any:
-    """Return numbers of any shape as nested lists with a number of digits.
-
-    None stands for NaN and for what is infinite.
-    """
-    array = np.round(np.asarray(values, float), digits)
-    known = np.isfinite(array)
-    if known.all():
-        return array.tolist()
-    return np.where(known, array.astype(object), np.array(None, object)).tolist()
 
 
 def write_use(use: float) -> str:

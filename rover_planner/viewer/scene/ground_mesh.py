@@ -107,10 +107,9 @@ def _leave_unlit(tree: dict) -> None:
 def _join_cells(known: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return the triangles (m, 3) between the centres of cells that are known (ny, nx)."""
     index = np.arange(known.size).reshape(known.shape)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-    whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, 1:] & known[1:, :-1]
-    lower = np.column_stack([a[whole], b[whole], c[whole]])
-    return np.concatenate([lower, np.column_stack([a[whole], c[whole], d[whole]])])
+    cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1)
+    cells = cells[known.ravel()[cells].all(axis=-1)]
+    return np.concatenate([cells[:, :3], cells[:, [0, 2, 3]]])
 
 
 def intersect_ground(terrain: Terrain, origin: Floats, direction: Floats) -> Floats | None:

@@ -43,8 +43,6 @@ class RoverState:
     """(6,) angles by which the wheels have turned [rad]."""
 
     def __getattr__(self, name: str) -> Any:
-        if name == "here":  # while a copy is made, which has nothing yet
-            raise AttributeError(name)
         return getattr(self.here, name)[0]
 
     @property
