@@ -131,6 +131,13 @@ def test_a_row_is_taken_by_click_and_key_and_a_slider_leaves_its_path_and_offers
     wait_for_rest(page)
 
 
+def test_verdicts_of_paths_have_the_colours_of_what_passes_and_of_what_is_refused(visitor):
+    read = "all => all.map((one) => [one.innerText.split(',')[0], getComputedStyle(one).color])"
+    visitor.open_tab("Paths")
+    found = dict(visitor.tab.eval_on_selector_all("#paths b.mark", read))
+    assert found == {"passes": "rgb(0, 114, 178)", "refused": "rgb(194, 79, 0)"}
+
+
 def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, page):
     ask(page, lambda: page.session.show_path(find_refused(page)))
     wait_for_rest(page)

@@ -15,14 +15,18 @@ const CLASSES = [[0.5, "little", "to 50 %"], [0.8, "half", "to 80 %"], [1, "near
 const kindOf = (use) => CLASSES.find(([most]) => (use === null ? most === null : use <= most))[1];
 const percent = (use) => (use < 99 ? `${Math.round(100 * use)} %` : "fails");
 
+// Children that there are: false, null and "" stand for none.
+const present = (children) => children.flat().filter(Boolean);
+const fill = (id, ...children) => at(id).replaceChildren(...present(children));
+
 // An element with its attributes and children; what begins with "on" listens.
 function make(tag, attributes = {}, ...children) {
   const element = SHAPES.includes(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (value !== null && value !== undefined && value !== false) element.setAttribute(name, value === true ? "" : value);
+    else if ((value ?? false) !== false) element.setAttribute(name, value === true ? "" : value);
   }
-  element.append(...children.flat().filter((child) => child !== null && child !== ""));
+  element.append(...present(children));
   return element;
 }
 
@@ -30,7 +34,7 @@ const button = (words, question, attributes = {}) =>
   make("button", { "data-ask": JSON.stringify(question), ...attributes }, words);
 const cells = (tag, values) => values.map((value) => make(tag, {}, value));
 const table = (heads, rows, attributes = {}) =>
-  make("table", attributes, heads.length ? make("tr", {}, cells("th", heads)) : "", rows);
+  make("table", attributes, heads.length && make("tr", {}, cells("th", heads)), rows);
 const key = (look, words) => make("span", { class: "key" }, make("i", look), words);
 
 // ---- The channel.
@@ -92,7 +96,7 @@ const DRAW = {
 
 function drawSubject(facts) {
   document.title = `${facts.rover} on ${facts.map}`;
-  at("subject").replaceChildren(...Object.entries(facts).filter(([, value]) => value)
+  fill("subject", Object.entries(facts).filter(([, value]) => value)
     .map(([name, value]) => make("div", {}, make("span", {}, `${name} `), make("b", {}, value))));
 }
 
@@ -101,7 +105,7 @@ function drawErrors() {
   document.querySelector("main").toggleAttribute("data-old", Boolean(state.lost));
   if (state.lost) lines.unshift("No connection to the program: what is shown is old. The page goes on by itself when the program runs again.");
   if (state.restarted) lines.push(`The program was started again; ${state.restarted}.`);
-  at("errors").replaceChildren(...cells("div", lines));
+  fill("errors", cells("div", lines));
 }
 
 // Under another name of this machine the scene has a process of its own: its pictures delay no number.
@@ -117,23 +121,22 @@ function drawVerdict(one) {
   box.toggleAttribute("data-old", Boolean(one.old));
   const open = box.querySelector("details")?.open;
   const policies = (one.policies || []).map((policy) =>
-    make("div", { "data-passes": policy.passes, "data-old": policy.old, title: policy.reason },
+    make("div", { "data-passes": String(policy.passes), "data-old": policy.old, title: policy.reason },
       policy.title, make("br"), make("b", {}, policy.word)));
-  const offers = (one.offers || []).map((offer) => button(offer.words, offer.ask, { class: "main" }));
-  box.replaceChildren(
+  fill("verdict",
     make("div", {}, make("span", { class: "word" }, one.word), " ", make("small", {}, one.about)),
-    ...(one.headline ? [make("div", { id: "headline" }, make("b", {}, one.headline), one.where ? `, ${one.where}` : "")] : []),
-    ...(one.chance ? [make("small", { id: "chance" }, one.chance)] : []),
-    ...(one.old ? [make("div", { class: "notice", id: "old" }, `old: ${one.old}`)] : []),
-    ...(one.refusal ? [make("div", { class: "notice", id: "refusal" }, `refused: ${one.refusal}`)] : []),
-    make("div", { class: "row" }, ...offers,
-      one.fails ? button("Go to the failure", { ask: "failure" }) : "",
-      one.judging ? make("small", { id: "judging" }, one.judging) : "",
-      one.judging && !one.stopped ? button("Cancel", { ask: "cancel" }) : "",
-      one.stopped ? button("Judge again", { ask: "judge" }) : ""),
-    make("div", { class: "policies" }, ...policies),
-    ...(one.details && one.details.length ? [make("details", { open: open || document.body.className === "sent" },
-      make("summary", {}, "the whole reason"), cells("div", one.details))] : []),
+    one.headline && make("div", { id: "headline" }, make("b", {}, one.headline), one.where && `, ${one.where}`),
+    one.chance && make("small", { id: "chance" }, one.chance),
+    one.old && make("div", { class: "notice", id: "old" }, `old: ${one.old}`),
+    one.refusal && make("div", { class: "notice", id: "refusal" }, `refused: ${one.refusal}`),
+    make("div", { class: "row" }, (one.offers || []).map((offer) => button(offer.words, offer.ask, { class: "main" })),
+      one.fails && button("Go to the failure", { ask: "failure" }),
+      one.judging && make("small", { id: "judging" }, one.judging),
+      one.judging && !one.stopped && button("Cancel", { ask: "cancel" }),
+      one.stopped && button("Judge again", { ask: "judge" })),
+    make("div", { class: "policies" }, policies),
+    one.details?.length && make("details", { open: open || document.body.className === "sent" },
+      make("summary", {}, "the whole reason"), cells("div", one.details)),
   );
 }
 
@@ -141,10 +144,10 @@ function drawVerdict(one) {
 function drawAdvice(advice) {
   const { words, rows } = advice || { rows: [] };
   const point = (words) => () => ask({ ask: "ghost", words });
-  at("advice").replaceChildren(...(!advice ? [] : [make("small", {}, `${words} `)]),
-    ...(advice?.seeking ? [button("Stop", { ask: "cancel" })] : []),
-    ...(advice?.can_ask ? [button("What would help?", { ask: "advise" })] : []),
-    make("ol", {}, ...rows.map((row) => make("li", !row.taken ? { class: "quiet" } : {
+  fill("advice", advice && make("small", {}, `${words} `),
+    advice?.seeking && button("Stop", { ask: "cancel" }),
+    advice?.can_ask && button("What would help?", { ask: "advise" }),
+    make("ol", {}, rows.map((row) => make("li", !row.taken ? { class: "quiet" } : {
       tabindex: 0, onpointerenter: point(row.words), onpointerleave: point(null), onkeydown: pressRow,
       onclick: () => ask({ ask: "remedy", words: row.words }),
     }, row.words, make("small", {}, ` (${row.costs})`)))));
@@ -153,15 +156,15 @@ function drawAdvice(advice) {
 function drawPaths({ rows, shown }) {
   const focus = document.activeElement?.dataset?.row;
   const bodies = rows.map((row, index) => make("tbody", {
-    "data-passes": row.passes, "data-old": Boolean(row.waits), "data-shown": index === shown,
+    "data-passes": String(row.passes), "data-old": Boolean(row.waits), "data-shown": index === shown,
     onclick: () => ask({ ask: "show", index }),
   },
-  make("tr", { tabindex: 0, "data-row": index, "aria-selected": index === shown, onkeydown: pressRow },
+  make("tr", { tabindex: 0, "data-row": index, "aria-selected": String(index === shown), onkeydown: pressRow },
     make("td", {}, make("b", {}, row.number)),
-    make("td", {}, make("b", { class: "mark" }, row.word), row.waits ? ` (${row.waits})` : ""),
+    make("td", {}, make("b", { class: "mark" }, row.word), row.waits && ` (${row.waits})`),
     make("td", {}, row.length), make("td", {}, row.energy), make("td", {}, row.use, make("br"), row.limit)),
   make("tr", {}, make("td"), make("td", { colspan: 4, class: "quiet" }, row.reason))));
-  at("paths").replaceChildren(table(["", "verdict", "length [m]", "energy [J]", "most used"], bodies, { role: "grid" }));
+  fill("paths", table(["", "verdict", "length [m]", "energy [J]", "most used"], bodies, { role: "grid" }));
   if (focus !== undefined) at("paths").querySelector(`[data-row="${focus}"]`)?.focus();
 }
 
@@ -177,9 +180,9 @@ function pressRow(event) {
 // ---- The rover.
 
 function drawSliders(parts) {
-  at("sliders").replaceChildren(...parts.map((part, k) => make("details", { open: k < 2 },
+  fill("sliders", parts.map((part, k) => make("details", { open: k < 2 },
     make("summary", {}, make("b", {}, part.title)),
-    ...part.sliders.map(([label, low, high, step, loaded]) => {
+    part.sliders.map(([label, low, high, step, loaded]) => {
       const send = ({ target }) => target.value && ask({ ask: "value", label, value: Number(target.value) });
       const move = () => { chosen.moved = label; };
       const settle = () => setTimeout(() => {
@@ -208,10 +211,10 @@ function drawChanges({ kept, rover, drive }) {
   const rows = [...rover, ...drive].map(([name, was, now]) => make("tr", {}, cells("td", [name, was, make("b", {}, now)])));
   const differs = rows.length ? table(["", kept ? "reference" : "loaded", "now"], rows)
     : make("div", { class: "quiet" }, `nothing differs from the rover as ${kept ? "kept" : "loaded"}`);
-  at("changes").replaceChildren(
+  fill("changes",
     make("div", { class: "row" },
       button("Undo", { ask: "undo" }), button("Reset", { ask: "reset" }),
-      button("Keep as reference", { ask: "keep" }), kept ? button("Compare with loaded", { ask: "drop" }) : "",
+      button("Keep as reference", { ask: "keep" }), kept && button("Compare with loaded", { ask: "drop" }),
       select("preset", (state.chosen?.presets || []).map((name) => [name, name]), state.chosen?.preset, (name) => ({ ask: "preset", name })),
       make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em",
         onchange: async ({ target: { files: [file] } }) => file && ask({ ask: "upload", name: file.name, text: await file.text() }) })),
@@ -222,7 +225,7 @@ function drawChanges({ kept, rover, drive }) {
 function select(label, options, now, question) {
   const known = options.some(([value]) => value === now) ? options : [...options, [now, now]];
   const box = make("select", { "aria-label": label, onchange: (event) => ask(question(event.target.value)) },
-    ...known.map(([value, words]) => make("option", { value }, words)));
+    known.map(([value, words]) => make("option", { value }, words)));
   box.value = now;
   return box;
 }
@@ -230,19 +233,19 @@ function select(label, options, now, question) {
 function drawChosen(now) {
   const colour = (changes) => ({ ask: "colour", layer: now.layer, heading: now.heading, along: now.along, ...changes });
   const row = (label, box) => make("div", { class: "row" }, make("label", {}, label), box);
-  const check = (label, on, question) => row(label, make("input", { type: "checkbox", "aria-label": label, ...(on ? { checked: true } : {}), onchange: (event) => ask(question(event.target.checked)) }));
-  const rows = [];
-  if (now.policies) rows.push(
-    row("A click sets", select("A click sets", [["goal", "goal"], ["start", "start"]], now.sets, (sets) => ({ ask: "click", sets }))),
-    row("Torques", select("Torques", now.policies, now.policy, (name) => ({ ask: "policy", name }))),
-    row("Soil", select("Soil", [["", "none (Coulomb)"], ...now.soils.map((name) => [name, name])], now.soil, (name) => ({ ask: "soil", name }))));
-  rows.push(row("Colour by", select("Colour by", now.layers.map((name) => [name, name]), now.layer, (layer) => colour({ layer }))));
-  if (now.predicted.includes(now.layer)) rows.push(
-    row("Heading [deg]", make("input", { type: "number", min: -180, max: 180, step: 5, value: now.heading, "aria-label": "Heading [deg]", onchange: (event) => ask(colour({ heading: Number(event.target.value) })) })),
-    check("Heading along the path", now.along, (along) => colour({ along })));
-  rows.push(check("Forces", now.forces, (shown) => ({ ask: "forces", shown })));
-  at("chosen").replaceChildren(...rows);
-  if (now.speeds) at("speed").replaceChildren(select("Speed", now.speeds.map((one) => [one, `${one} x`]), now.speed, (times) => ({ ask: "speed", times: Number(times) })));
+  const check = (label, on, question) => row(label, make("input", { type: "checkbox", "aria-label": label, checked: on, onchange: (event) => ask(question(event.target.checked)) }));
+  const choose = (label, options, chosen, question) => row(label, select(label, options, chosen, question));
+  fill("chosen",
+    now.policies && [
+      choose("A click sets", [["goal", "goal"], ["start", "start"]], now.sets, (sets) => ({ ask: "click", sets })),
+      choose("Torques", now.policies, now.policy, (name) => ({ ask: "policy", name })),
+      choose("Soil", [["", "none (Coulomb)"], ...now.soils.map((name) => [name, name])], now.soil, (name) => ({ ask: "soil", name }))],
+    choose("Colour by", now.layers.map((name) => [name, name]), now.layer, (layer) => colour({ layer })),
+    now.predicted.includes(now.layer) && [
+      row("Heading [deg]", make("input", { type: "number", min: -180, max: 180, step: 5, value: now.heading, "aria-label": "Heading [deg]", onchange: (event) => ask(colour({ heading: Number(event.target.value) })) })),
+      check("Heading along the path", now.along, (along) => colour({ along }))],
+    check("Forces", now.forces, (shown) => ({ ask: "forces", shown })));
+  if (now.speeds) fill("speed", select("Speed", now.speeds.map((one) => [one, `${one} x`]), now.speed, (times) => ({ ask: "speed", times: Number(times) })));
   drawShare();
   if (state.changes) drawChanges(state.changes);
   if (!now.policies) openTab(chosen.tab);
@@ -266,11 +269,11 @@ function drawLimits({ end, lanes, code, compared }) {
   const rows = lanes.map((lane) => make("div", { class: "lane", "data-code": lane.code, onclick: () => { chosen.lane = lane.code; drawCurves(); drawUses(); } },
     make("div", {}, lane.title),
     make("div", { class: `strip ${compared ? "compared" : ""}`, onclick: goTo },
-      ...strip(lane.now, lane.title), ...(lane.before ? strip(lane.before, `reference: ${lane.title}`, "before") : []), make("div", { class: "cursor" })),
+      strip(lane.now, lane.title), lane.before && strip(lane.before, `reference: ${lane.title}`, "before"), make("div", { class: "cursor" })),
     make("div", {}), make("div", { class: "worst" })));
-  at("limits").replaceChildren(
+  fill("limits",
     make("h2", {}, "Use of the limits ", make("small", {}, end ? `over ${end.toFixed(2)} m${compared ? "; below: the reference" : ""}` : "at the first pose")),
-    ...rows, make("div", {}, CLASSES.map(([, kind, words]) => key({ class: kind }, words))));
+    rows, make("div", {}, CLASSES.map(([, kind, words]) => key({ class: kind }, words))));
   drawUses();
   drawCurves();
 }
@@ -300,7 +303,7 @@ function drawUses() {
 function drawCurves() {
   const lane = state.limits?.lanes.find((one) => one.code === chosen.lane);
   if (!lane) return;
-  at("curves").replaceChildren(
+  fill("curves",
     make("h2", {}, lane.code === "chance" ? "chance of failure" : `${lane.title}, use of the limit`), plot(lane.wheels || lane.now, percent, 1.0, lane.before),
     make("h2", {}, "wheel loads"), plot(state.limits.loads, (value) => `${value.toFixed(0)} N`, null, null),
     make("div", {}, Object.entries(COLOURS).map(([name, colour]) => key({ style: `background:${colour}` }, name)),
@@ -323,11 +326,11 @@ function plot(curve, write, limit, old) {
   if (old) line(old.x, old.y[0], { stroke: "#888", "stroke-width": 4, opacity: 0.6 });
   curve.y.forEach((y, k) => {
     const wheel = ["rear", "middle", "front"][k % 3];
-    line(curve.x, y, curve.y.length === 6 ? { stroke: COLOURS[wheel], ...(k > 2 ? { "stroke-dasharray": "5 3" } : {}) } : { stroke: "#222" });
+    line(curve.x, y, curve.y.length === 6 ? { stroke: COLOURS[wheel], "stroke-dasharray": k > 2 && "5 3" } : { stroke: "#222" });
   });
   if (limit) line([0, end], [limit, limit], { stroke: "#c24f00", "stroke-dasharray": "2 3" });
   return make("div", { class: "plot", onclick: goTo }, box,
-    ...[0, top, ...(limit ? [limit] : [])].map((value) => make("span", { class: "tick", style: `top:${down(value)}%` }, write(value))),
+    [0, top, limit].filter((value) => value !== null).map((value) => make("span", { class: "tick", style: `top:${down(value)}%` }, write(value))),
     make("span", { class: "end" }, `${(state.limits.end || 0).toFixed(2)} m`), make("div", { class: "cursor" }));
 }
 
@@ -339,10 +342,7 @@ function moveCursor() {
 // ---- The drive.
 
 function drawBoard(board) {
-  if (!board) {
-    at("board").replaceChildren(make("div", { class: "quiet" }, "the rover is not known yet"));
-    return;
-  }
+  if (!board) return fill("board", make("div", { class: "quiet" }, "the rover is not known yet"));
   const bar = ([title, use, words]) => make("div", {}, make("small", {}, `${title} `), make("b", {}, words),
     make("span", { class: "use" },
       make("i", { class: kindOf(use), style: `width:${100 * Math.min((use ?? 1.5) / 1.5, 1)}%` }),
@@ -350,11 +350,11 @@ function drawBoard(board) {
   const wheels = [5, 2, 4, 1, 3, 0].map((k) => board.wheels[k]).map((wheel) =>
     make("div", { class: "wheel", "data-fails": wheel.fails },
       make("div", {}, make("div", { class: "tyre", style: `background:${wheel.colour};transform:rotate(${-(wheel.turn || 0)}deg)` }), make("small", {}, wheel.load)),
-      make("div", {}, make("div", {}, wheel.name, wheel.slip ? make("small", {}, `, ${wheel.slip}`) : ""), ...wheel.bars.map(bar))));
-  at("board").replaceChildren(
+      make("div", {}, make("div", {}, wheel.name, wheel.slip && make("small", {}, `, ${wheel.slip}`)), wheel.bars.map(bar))));
+  fill("board",
     make("div", { class: "quiet" }, "from above, the front at the top; bars: use of the limit, which is the line"),
-    make("div", { class: "wheels" }, ...wheels),
-    make("div", { class: "numbers" }, ...Object.entries(board.numbers).map(([name, value]) => make("div", {}, make("span", {}, name), make("b", {}, value)))),
+    make("div", { class: "wheels" }, wheels),
+    make("div", { class: "numbers" }, Object.entries(board.numbers).map(([name, value]) => make("div", {}, make("span", {}, name), make("b", {}, value)))),
     make("details", { open: document.body.className === "sent" || (at("board").querySelector("details")?.open ?? innerHeight > ROOMY) },
       make("summary", {}, "all numbers of the wheels"),
       table(["", ...board.wheels.map((wheel) => wheel.name)],
@@ -375,21 +375,21 @@ function drawDrive(drive) {
 }
 
 function drawLegend({ title, gradient, ends, keys, notes }) {
-  at("legend").replaceChildren(make("b", {}, title),
-    ...(gradient.length ? [make("div", { class: "bar", style: `background:linear-gradient(90deg,${gradient})` }),
-      make("div", { class: "ends" }, ...ends.map((end) => make("span", {}, end)))] : []),
-    ...keys.map(([colour, words]) => make("div", {}, key(colour === "hatched" ? { class: "hatched" } : { style: `background:${colour}` }, words))),
-    ...cells("div", notes));
+  fill("legend", make("b", {}, title),
+    gradient.length && make("div", { class: "bar", style: `background:linear-gradient(90deg,${gradient})` }),
+    gradient.length && make("div", { class: "ends" }, cells("span", ends)),
+    keys.map(([colour, words]) => make("div", {}, key(colour === "hatched" ? { class: "hatched" } : { style: `background:${colour}` }, words))),
+    cells("div", notes));
 }
 
 function drawLearned(lines) {
-  at("learned").replaceChildren(...cells("h2", lines.length ? ["learned of the ground"] : []), ...cells("div", lines));
+  fill("learned", lines.length && make("h2", {}, "learned of the ground"), cells("div", lines));
 }
 
 function drawTopics(topics) {
   const rows = topics.map(({ topic, age, stale }) =>
     make("tr", { "data-old": stale }, cells("td", [topic, `${stale ? "stale, " : ""}${age}`])));
-  at("topics").replaceChildren(make("h2", {}, "age of the last message"), table([], rows));
+  fill("topics", make("h2", {}, "age of the last message"), table([], rows));
 }
 
 // ---- Share.
@@ -397,17 +397,17 @@ function drawTopics(topics) {
 function drawShare() {
   const { written, link } = state;
   const address = link ? `${location.origin}${location.pathname}?${link}` : "";
-  at("share").replaceChildren(...(written ? [
+  fill("share", written ? [
     make("h2", {}, "How it was made"), make("div", {}, `${written.versions}; written ${written.written}`),
-    ...(written.link ? [make("div", {}, "the same on a page of the same map: ", make("a", { href: written.link }, written.link))] : []),
+    written.link && make("div", {}, "the same on a page of the same map: ", make("a", { href: written.link }, written.link)),
     make("details", {}, make("summary", {}, "rover file"), make("pre", {}, written.rover)),
   ] : [
     make("p", {}, "One HTML file with the scene, the failing pose, all numbers and versions. It opens in any browser, without this program."),
     button("Save as HTML file", { ask: "save page", base: location.origin }),
     make("p", {}, "A link to this page that holds rover, changed values, ends, path, time and colours."),
     button("Link to what is shown", { ask: "link" }),
-    ...(link ? [make("div", { class: "row" }, make("button", { onclick: () => navigator.clipboard.writeText(address) }, "Copy"), make("a", { id: "link", href: address }, address))] : []),
-  ]));
+    link && make("div", { class: "row" }, make("button", { onclick: () => navigator.clipboard.writeText(address) }, "Copy"), make("a", { id: "link", href: address }, address)),
+  ]);
 }
 
 function saveFile({ name, text }) {
@@ -423,7 +423,7 @@ function openTab(name) {
   const plans = !state.chosen || state.chosen.policies; // else it follows a rover, which has its own program
   const panels = [...at("panels").children].filter((panel) => plans || ["Drive", "Ground"].includes(panel.dataset.tab));
   for (const panel of at("panels").children) panel.toggleAttribute("data-open", panel.dataset.tab === name);
-  at("tabs").replaceChildren(...panels.map((panel) => make("button", {
+  fill("tabs", panels.map((panel) => make("button", {
     role: "tab", "aria-selected": String(panel.dataset.tab === name), onclick: () => openTab(panel.dataset.tab) }, panel.dataset.tab)));
 }
 
