@@ -235,29 +235,21 @@ class LivingMap:
         if self._rolls:
             n = max(2, round(self.values.map_window / self.grid.resolution))
             column, row = (round(value) - n // 2 for value in self.grid.coordinates(*centre))
-            is_kept = (
-                old is not None
-                and (old.rows, old.columns) == (n, n)
-                and max(abs(old.row - row), abs(old.column - column)) <= n // ROLL
-            )
-            return old if is_kept and old is not None else CellBox(row, column, n, n)
+            if old is None or (old.rows, old.columns) != (n, n):
+                return CellBox(row, column, n, n)
+            is_near = max(abs(old.row - row), abs(old.column - column)) <= n // ROLL
+            return old if is_near else CellBox(row, column, n, n)
         if old is None:
             loaded = self.loaded
             return box if loaded is None else box_on(loaded, self.grid).union(box)
         if old.contains(box):
             return old
         union = old.union(box)
-        (end_row, end_column), (old_row, old_column) = union.end, old.end
-        return CellBox.between(
-            (
-                union.row - GROWTH * (union.row < old.row),
-                union.column - GROWTH * (union.column < old.column),
-            ),
-            (
-                end_row + GROWTH * (end_row > old_row),
-                end_column + GROWTH * (end_column > old_column),
-            ),
-        )
+        row = union.row - GROWTH * (union.row < old.row)
+        column = union.column - GROWTH * (union.column < old.column)
+        ends = zip(union.end, old.end, strict=True)
+        end_row, end_column = (now + GROWTH * (now > before) for now, before in ends)
+        return CellBox.between((row, column), (end_row, end_column))
 
     def _with_loaded(self, window: Patch) -> Patch:
         """Return a window whose unknown cells are those of the loaded map."""

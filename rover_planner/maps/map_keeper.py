@@ -75,13 +75,10 @@ class MapKeeper:
         Raises:
             PlanningError: The window would be too large.
         """
-        if not (self._living.values.fill_under_rover and self._living.grid):
-            return None
         return self._living.snapshot() if self._fill(standing, time) else None
 
     def _filled(self, standing: Standing | None, time: float) -> MapSnapshot:
-        if self._living.values.fill_under_rover:
-            self._fill(standing, time)
+        self._fill(standing, time)
         snapshot = self._living.snapshot()
         assert snapshot is not None
         return snapshot
@@ -91,17 +88,18 @@ class MapKeeper:
 
         Only the start has a margin: elsewhere it would lead on and on over unseen ground.
         """
-        changed = False
+        values, grid = self._living.values, self._living.grid
+        if grid is None or not values.fill_under_rover:
+            return False
+        grounds = []
         if standing is not None:
             now = find_ground_beneath(self._rover, standing)
-            changed |= self._fill_with(now, 0.0, time)
+            grounds.append((now, 0.0))
             self._start = self._start or now
         if self._start is not None:
-            changed |= self._fill_with(self._start, self._living.values.footprint_margin, time)
+            grounds.append((self._start, values.footprint_margin))
+        changed = False
+        for ground, margin in grounds:
+            patch, is_contact = ground.patch(grid, margin, values.footprint_std)
+            changed |= self._living.fill(patch, is_contact, time)
         return changed
-
-    def _fill_with(self, ground: GroundBeneath, margin: float, time: float) -> bool:
-        grid = self._living.grid
-        assert grid is not None
-        patch, is_contact = ground.patch(grid, margin, self._living.values.footprint_std)
-        return self._living.fill(patch, is_contact, time)
