@@ -103,14 +103,14 @@ class LiveListener(Node):
         for field in ESTIMATED_FIELDS:
             take = partial(self._on_estimate, field)
             self._listen(numbers, f"{CONTROLLER}/{field}", take, topic_qos(), is_stream=True)
-        self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, None, True)
+        self._ages[SIGN_OF_LIFE] = TopicAge(None, True)
         self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, topic_qos())
 
     def _listen(
         self, kind: Any, topic: str, take: Take, qos: QoSProfile, *, is_stream: bool = False
     ) -> None:
         """Subscribe to a topic and note the age of its messages."""
-        age = self._ages[topic] = TopicAge(topic, None, is_stream)
+        age = self._ages[topic] = TopicAge(None, is_stream)
 
         def hear(message: Any) -> None:
             age.heard = time.monotonic()

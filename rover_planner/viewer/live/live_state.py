@@ -32,8 +32,6 @@ PATIENCE = 2.0
 class TopicAge:
     """The age of a topic's last message."""
 
-    topic: str
-    """Its name."""
     heard: float | None
     """Time on the monotonic clock [s]; None if no message has come."""
     is_stream: bool

@@ -121,15 +121,15 @@ class LivePage(PageBase):
             words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
             tell("drive", {"duration": None, "words": words})
             tell("topics", [
-                {"topic": one.topic, "age": one.describe(), "stale": one.is_stale}
-                for one in data.ages.values()
+                {"topic": topic, "age": one.describe(), "stale": one.is_stale}
+                for topic, one in data.ages.items()
             ])  # fmt: skip
 
     def _take_terrain(self, data: LiveData, now: float) -> None:
         """Show a new map, at most every GROUND_PERIOD."""
         terrain = data.terrain
-        is_new = terrain is not None and terrain is not self.ground
-        if terrain is None or not is_new or now - self._ground_at < GROUND_PERIOD:
+        is_soon = now - self._ground_at < GROUND_PERIOD
+        if terrain is None or terrain is self.ground or is_soon:
             return
         self.ground, self.ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.canvas.move_to(terrain):

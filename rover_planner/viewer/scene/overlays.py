@@ -94,12 +94,10 @@ class PathOverlay:
             origin: (3,) start of the ray, a camera [m].
             direction: (3,) its direction, of length 1.
         """
-        for index, place in enumerate(self._numbers):
-            away = place - origin
-            aside = np.linalg.norm(np.cross(direction, away))
-            if direction @ away > 0.0 and aside < NUMBER_ANGLE * np.linalg.norm(away):
-                return index
-        return None
+        away = self._numbers - origin
+        aside = np.linalg.norm(np.cross(direction, away), axis=1)
+        hit = (away @ direction > 0.0) & (aside < NUMBER_ANGLE * np.linalg.norm(away, axis=1))
+        return int(hit.argmax()) if hit.any() else None
 
     def mark_old(self, indices: frozenset[int]) -> None:
         """Grey the lines of paths whose verdicts are of old values, and colour all others."""
