@@ -99,7 +99,7 @@ class Patch:
             source: Their new source.
             time: Their new time [s].
         """
-        names = tuple(name for name in patch.layers if name in EMPTY)
+        names = tuple(patch.layers)
         old = self.with_layers(names)
         to, own = patch.box.within(old.box), old.box.within(patch.box)
         layers = {name: layer.copy() for name, layer in old.layers.items()}

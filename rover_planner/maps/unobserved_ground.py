@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.cells import CellBox, grid_of
 from rover_planner.maps.layers import FOOTPRINT, CellSources
 from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
 
@@ -86,16 +87,11 @@ class ObservedGround:
 
     def _is_seen_around(self, rover: Rover, poses: NDArray[np.float64]) -> bool:
         """Return whether all ground around a path is on the map and was seen."""
-        half = _corner_distance(rover)
-        low, high = poses[:, :2].min(axis=0) - half, poses[:, :2].max(axis=0) + half
-        origin, step = self.terrain.origin, self.terrain.resolution
-        first = np.floor((low - origin) / step).astype(int)
-        last = np.ceil((high - origin) / step).astype(int)
-        ny, nx = self.kinds.shape
-        if (first < 0).any() or last[0] >= nx or last[1] >= ny:
-            return False
-        box = self.kinds[first[1] : last[1] + 1, first[0] : last[0] + 1]
-        return not (box != SEEN).any()
+        low, high = poses[:, :2].min(axis=0), poses[:, :2].max(axis=0)
+        reach = _corner_distance(rover) + self.terrain.resolution
+        box = grid_of(self.terrain).box_around(0.5 * (low + high), 0.5 * (high - low) + reach)
+        whole = CellBox(0, 0, *self.kinds.shape)
+        return whole.contains(box) and not (self.kinds[box.within(whole)] != SEEN).any()
 
     def _spread_out(
         self, rover: Rover, poses: NDArray[np.float64]
@@ -134,8 +130,7 @@ class ObservedGround:
         for here in np.array_split(near, 1 + len(near) * len(u) // CHUNK):
             x, y, yaw = poses[here, :, None].transpose(1, 0, 2)
             c, s = np.cos(yaw), np.sin(yaw)
-            columns = (x + c * u - s * v - terrain.origin[0]) / terrain.resolution
-            rows = (y + s * u + c * v - terrain.origin[1]) / terrain.resolution
+            columns, rows = grid_of(terrain).coordinates(x + c * u - s * v, y + s * u + c * v)
             i, j = np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
             on_map = (i >= 0) & (i < ny) & (j >= 0) & (j < nx)
             kinds = np.where(on_map, self.kinds[i.clip(0, ny - 1), j.clip(0, nx - 1)], UNSEEN)
