@@ -16,9 +16,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_poses
 from rover_planner.figures.pictures import drawing
+from rover_planner.studies.objectives import level_loads
 
 AXLES = ("rear", "middle", "front")
 MAX_TORQUE = 0.2
@@ -33,11 +32,7 @@ _HEADROOM = 1.55
 
 def loads_at_rest(rover: Rover) -> np.ndarray:
     """Return the loads (3,) [N] of rear, middle and front wheel of one side on level ground."""
-    cell = 0.5 * rover.wheel.radius
-    half = 3.0 * max(abs(place[0]) for place in rover.suspension.wheels.values())
-    count = 2 * int(np.ceil(half / cell)) + 1
-    level = Terrain(np.zeros((count, count)), cell, (-0.5 * (count - 1) * cell,) * 2)
-    loads = judge_poses(rover, level, np.zeros((1, 3)))[0].wheel_loads[0]
+    loads = level_loads(rover)
     return 0.5 * (loads[:3] + loads[3:])
 
 

@@ -15,7 +15,7 @@ from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
-from rover_planner.studies.objectives import evaluate, load_shares
+from rover_planner.studies.objectives import evaluate, level_loads
 from rover_planner.studies.rover_values import vary
 from rover_planner.studies.study_file import OBJECTIVES, Study, label_of, name_thing
 
@@ -152,11 +152,11 @@ def _try(study: Study, values: tuple[float, ...]) -> Trial:
     trial = Trial(values, float("nan"), "")
     try:
         rover = find_rover(study, trial)
-        shares = tuple(load_shares(rover).tolist())
+        loads = level_loads(rover)
         objective, note = evaluate(study, rover)
     except (RoverFileError, ModelError) as error:
         return replace(trial, note=str(error))
-    return Trial(values, objective, note, shares)
+    return Trial(values, objective, note, tuple((loads / loads.sum()).tolist()))
 
 
 class _EnoughError(Exception):
