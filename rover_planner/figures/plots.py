@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.errors import PlanningError
 from rover_planner.figures.pictures import (
     INK,
     PASSABLE,
@@ -61,10 +60,8 @@ def draw_answers(
         title: Heading of the picture.
 
     Raises:
-        PlanningError: No answers, or the file cannot be written.
+        PlanningError: The file cannot be written.
     """
-    if not answers:
-        raise PlanningError("no answers to draw; there must be at least one")
     shown = list(answers)[:_COLUMNS]
     with drawing(path, (max(12.5, 2.6 * len(shown)), 15.5)) as figure:
         grid = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.05))
