@@ -10,6 +10,7 @@ import numpy as np
 
 import rover_physics
 from rover_physics.bounds.path import SIGMAS, check_sigmas
+from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
@@ -62,8 +63,7 @@ class SurveyRequest:
         Args:
             map_hash: Hash of the map's content.
         """
-        asked: dict[str, Any] = json.loads(json.dumps(asdict(self)))
-        return asked | {"map": map_hash, "version": rover_physics.__version__}
+        return to_plain(asdict(self)) | {"map": map_hash, "version": rover_physics.__version__}
 
 
 def hash_of(description: dict[str, Any]) -> str:

@@ -30,9 +30,6 @@ KEPT = "finished chunks are kept, and the same command goes on with the others"
 GONE = f"the scheduler is gone; {KEPT}"
 ALONE = f"the cluster has no worker any more; {KEPT}"
 
-Task = Callable[[SurveyJob, Index], ChunkReport]
-"""Work of a task."""
-
 
 @dataclass
 class SurveyOutcome:
@@ -51,7 +48,7 @@ def run_survey(
     chunks: Iterable[Index],
     settings: ClusterSettings,
     on_chunk: Callable[[ChunkReport], object] = lambda report: None,
-    task: Task = survey_chunk,
+    task: Callable[[SurveyJob, Index], ChunkReport] = survey_chunk,
 ) -> SurveyOutcome:
     """Survey chunks on a cluster.
 
