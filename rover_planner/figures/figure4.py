@@ -94,8 +94,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
     }
     centre = loads_at_rest(rover)
     largest = 1.15 * max(np.abs(values - centre).max() for values in loads.values())
-    bold = {"axes.titlesize": 11, "axes.titleweight": "bold"}
-    with drawing(path, (10.5, 9.0), bold) as figure:
+    with drawing(path, (10.5, 9.0)) as figure:
         panels = figure.subplots(3, 3, sharex=True, sharey="col")
         for row in range(3):
             for column in range(3):
@@ -109,7 +108,8 @@ def draw_figure4(path: Path, rover: Rover) -> None:
                 axes.set_xlabel(f"{AXLES[row]} wheel torque [mN·m]")
                 axes.set_ylabel(f"{AXLES[column]} load [N]")
         for column in range(3):
-            panels[0, column].set_title(f"{AXLES[column].capitalize()} normal force")
+            title = f"{AXLES[column].capitalize()} normal force"
+            panels[0, column].set_title(title, fontsize=11, fontweight="bold")
         panels[0, 0].set_xticks([-200, -100, 0, 100, 200])
         figure.suptitle(
             f"Over-actuation of {rover.name} on level ground: wheel loads against one torque",

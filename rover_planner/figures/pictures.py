@@ -2,7 +2,7 @@
 """The common parts of all pictures: style, writing to a file, and the shaded ground of a map."""
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -66,21 +66,18 @@ def check_picture(path: Path) -> None:
 
 
 @contextmanager
-def drawing(
-    path: Path, size: tuple[float, float], style: Mapping[str, Any] | None = None
-) -> Iterator[Figure]:
+def drawing(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
     """Yield a figure to draw in; write it to a file at the end.
 
     Args:
         path: Picture to write; its suffix sets the format, such as .png.
         size: Width and height [inch].
-        style: Settings of matplotlib that differ from STYLE.
 
     Raises:
         PlanningError: The suffix names no format, or the file cannot be written.
     """
     check_picture(path)
-    with matplotlib.rc_context(STYLE | dict(style or {})):
+    with matplotlib.rc_context(STYLE):
         figure, picture = Figure(figsize=size, layout="constrained"), io.BytesIO()
         FigureCanvasAgg(figure)
         yield figure
