@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.rover.model import Rover
 from rover_planner.figures.pictures import drawing
 from rover_planner.studies.objectives import level_loads
 
-AXLES = ("rear", "middle", "front")
 MAX_TORQUE = 0.2
 """Torques vary between minus and plus MAX_TORQUE [N m], as in the paper."""
 ALONE, HELD = "other motors off, thrust held at the body", "thrust held by all wheels alike"
@@ -48,8 +48,8 @@ def load_changes(rover: Rover, tractions: np.ndarray) -> np.ndarray:
         tractions: (3,) tractions of the wheels of one side, positive forward [N].
     """
     suspension = rover.suspension
-    wheels = np.array([suspension.wheels[name] for name in AXLES])
-    on_bogie = np.array([name != suspension.rocker_wheel for name in AXLES])
+    wheels = np.array([suspension.wheels[name] for name in WHEEL_POSITIONS])
+    on_bogie = np.array([name != suspension.rocker_wheel for name in WHEEL_POSITIONS])
     ground = wheels[:, 2] - rover.wheel.radius
     rocker, bogie = np.array(suspension.rocker_pivot), np.array(suspension.bogie_pivot)
     about_rocker = np.sum((ground - rocker[2]) * tractions)
@@ -65,7 +65,7 @@ def loads_under_torque(rover: Rover, axle: int, torque: float, case: str) -> np.
 
     Args:
         rover: The rover.
-        axle: Index into AXLES.
+        axle: Index into WHEEL_POSITIONS.
         torque: Torque on each of the two wheels, positive forward [N m].
         case: ALONE or HELD.
     """
@@ -105,10 +105,10 @@ def draw_figure4(path: Path, rover: Rover) -> None:
                     centre[column], color="#999999", linewidth=0.8, zorder=1.9, label="no torque"
                 )
                 axes.set_ylim(centre[column] - largest, centre[column] + _HEADROOM * largest)
-                axes.set_xlabel(f"{AXLES[row]} wheel torque [mN·m]")
-                axes.set_ylabel(f"{AXLES[column]} load [N]")
+                axes.set_xlabel(f"{WHEEL_POSITIONS[row]} wheel torque [mN·m]")
+                axes.set_ylabel(f"{WHEEL_POSITIONS[column]} load [N]")
         for column in range(3):
-            title = f"{AXLES[column].capitalize()} normal force"
+            title = f"{WHEEL_POSITIONS[column].capitalize()} normal force"
             panels[0, column].set_title(title, fontsize=11, fontweight="bold")
         panels[0, 0].set_xticks([-200, -100, 0, 100, 200])
         figure.suptitle(

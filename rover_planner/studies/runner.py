@@ -5,7 +5,7 @@ import contextlib
 import csv
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -134,28 +134,27 @@ def run_study(study: Study, on_trial: Callable[[Trial], None] | None = None) -> 
     return StudyResult(study, baseline, tuple(trials))
 
 
-def find_rover(study: Study, trial: Trial) -> Rover:
-    """Return the rover of a trial.
+def find_rover(study: Study, values: tuple[float, ...]) -> Rover:
+    """Return the rover with values of the parameters, in their order.
 
     Raises:
         RoverFileError, ModelError: It is invalid.
     """
     numbers = {
         key: value
-        for parameter, value in zip(study.parameters, trial.values, strict=True)
+        for parameter, value in zip(study.parameters, values, strict=True)
         for key in parameter.keys
     }
     return vary(study.rover, numbers)
 
 
 def _try(study: Study, values: tuple[float, ...]) -> Trial:
-    trial = Trial(values, float("nan"), "")
     try:
-        rover = find_rover(study, trial)
+        rover = find_rover(study, values)
         loads = level_loads(rover)
         objective, note = evaluate(study, rover)
     except (RoverFileError, ModelError) as error:
-        return replace(trial, note=str(error))
+        return Trial(values, float("nan"), str(error))
     return Trial(values, objective, note, tuple((loads / loads.sum()).tolist()))
 
 
