@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from rover_physics.files.user_file import write_file
@@ -84,6 +85,11 @@ def drawing(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
         figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
     with errors_of(path, PlanningError):
         write_file(path, picture.getvalue())
+
+
+def outlined(width: float, colour: str = "white") -> dict[str, Any]:
+    """Return the style of a line with another colour around it, up to a width [pt]."""
+    return {"path_effects": [withStroke(linewidth=width, foreground=colour)]}
 
 
 def find_extent(origin: tuple[float, float], shape: tuple[int, ...], resolution: float) -> Extent:
