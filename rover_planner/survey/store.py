@@ -19,12 +19,7 @@ from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.survey.geotiff import GeoTiffMap
-from rover_planner.survey.layers import (
-    CLASS_NUMBERS,
-    NOT_SURVEYED,
-    list_layers,
-    number_limits,
-)
+from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED, list_layers, number_limits
 from rover_planner.survey.layout import Index, SurveyLayout
 from rover_planner.survey.map_source import MAP, MapFrame, StoredMap, keep_map
 from rover_planner.survey.request import hash_of

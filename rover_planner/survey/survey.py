@@ -111,12 +111,9 @@ def _make_notes(
     request: SurveyRequest, frame: MapFrame, map_file: str, content: str, chunk: int | None
 ) -> StoreNotes:
     """Return the notes of a new store."""
-    side = choose_chunk(frame.shape, request.step, request.headings)
+    if chunk is not None and chunk < 1:
+        raise PlanningError(f"chunk is {chunk}; it must be 1 or more surveyed cells")
+    side = choose_chunk(frame.shape, request.step, request.headings, chunk)
     halo = find_halo(request.rover, frame.resolution)
-    if chunk is not None:
-        if chunk < 1:
-            raise PlanningError(f"chunk is {chunk}; it must be 1 or more surveyed cells")
-        tile = SurveyLayout(frame.shape, request.step, side, halo).tile
-        side = -(-chunk // tile) * tile
     layout = SurveyLayout(frame.shape, request.step, side, halo)
     return StoreNotes(request.describe(content), layout, frame, map_file)
