@@ -64,7 +64,7 @@ def survey_here(
 
 def layers_of(store: SurveyStore) -> dict[str, np.ndarray]:
     """Return all layers of a store."""
-    return {name: store.layer(name)[:] for name in store.layer_names()}
+    return {name: store.layer(name)[:] for name in store.notes.layers}
 
 
 def count_chunks(out: Path) -> int:

@@ -71,7 +71,7 @@ def write_layers(store: SurveyStore, folder: Path) -> None:
         PlanningError: A file cannot be written.
     """
     make_folder(folder)
-    for name in store.layer_names():
+    for name in store.notes.layers:
         write_cog(
             folder / f"{name}.tif", store.layer(name), store.notes.frame, store.notes.layout.step
         )

@@ -29,12 +29,10 @@ FORMAT = 2
 NOTES = "rover_planner_survey"
 """Attribute of the store with all that is known of its survey."""
 SECONDS = "seconds"
-"""Array (rows, columns) of chunks: time that a chunk took [s]; NaN while it is not finished,
-FAILED if it failed. Each element is a file, written last."""
+"""Array (rows, columns) of chunks: time that a chunk took [s]; NaN while it is not finished. Each
+element is a file, written last."""
 WRITERS = 8
 """Number of layers that are written at a time."""
-FAILED = -1.0
-"""Seconds of a chunk that failed."""
 UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError)
 """Errors of Zarr and its codecs where a file is damaged or gone."""
 
@@ -159,7 +157,7 @@ class SurveyStore:
                 "name another folder, or remove it"
             ) from None
         layout = self.notes.layout
-        for name in (*self.layer_names(), SECONDS):
+        for name in (*self.notes.layers, SECONDS):
             shape = layout.chunks if name == SECONDS else layout.shape
             if name not in self._group:
                 raise _damaged(path, name, KeyError(name))
@@ -189,7 +187,7 @@ class SurveyStore:
     def find_finished(self) -> set[Index]:
         """Return the chunks that are finished, and of which no file was lost since."""
         rows, columns = np.nonzero(self.layer(SECONDS)[:] >= 0.0)
-        layers = [self.layer(name) for name in self.layer_names()]
+        layers = [self.layer(name) for name in self.notes.layers]
         return {
             chunk
             for chunk in zip(rows.tolist(), columns.tolist(), strict=True)
@@ -218,21 +216,13 @@ class SurveyStore:
         with ThreadPoolExecutor(WRITERS) as writers:  # the disk takes many files at a time
             for _ in writers.map(put, layers):
                 pass
-        self._group[SECONDS][chunk] = max(seconds, 0.0)
+        self._group[SECONDS][chunk] = seconds
         force_to_disk(self.layer(SECONDS).file_of(chunk), self.path)
-
-    def mark_failed(self, chunk: Index) -> None:
-        """Write that a chunk failed."""
-        self._group[SECONDS][chunk] = FAILED
 
     def open_map(self) -> GeoTiffMap | StoredMap:
         """Return the map: the GeoTIFF that the notes name, or, if they name none, the kept one."""
         file = self.notes.map_file
         return GeoTiffMap(Path(file)) if file else StoredMap(self._group[MAP])
-
-    def layer_names(self) -> list[str]:
-        """Return the names of the layers."""
-        return list(self.notes.layers)
 
     def layer(self, name: str) -> KeptLayer:
         """Return a layer (rows, columns)."""
