@@ -95,7 +95,7 @@ def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
 
 def refuse_one(job: SurveyJob, chunk: Index) -> ChunkReport:
     """Report of any chunk what a task reports on a full disk."""
-    return ChunkReport(chunk, refusal="No room")
+    return ChunkReport(refusal="No room")
 
 
 def die_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:

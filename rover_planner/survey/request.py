@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The question of a survey: rover, options, headings and distance of cells."""
 
-import hashlib
-import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -64,8 +62,3 @@ class SurveyRequest:
             map_hash: Hash of the map's content.
         """
         return to_plain(asdict(self)) | {"map": map_hash, "version": rover_physics.__version__}
-
-
-def hash_of(description: dict[str, Any]) -> str:
-    """Return the hash of a description of a survey."""
-    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()[:16]

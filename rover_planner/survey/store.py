@@ -22,7 +22,6 @@ from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED, list_layers, number_limits
 from rover_planner.survey.layout import Index, SurveyLayout
 from rover_planner.survey.map_source import MAP, MapFrame, StoredMap, keep_map
-from rover_planner.survey.request import hash_of
 
 FORMAT = 2
 """Version of the store's format: 2 writes all files of a chunk, also those without values."""
@@ -71,7 +70,6 @@ class StoreNotes:
         layout, frame = self.layout, self.frame
         return {
             "format": FORMAT,
-            "hash": hash_of(self.description),
             "description": self.description,
             "map_shape": list(layout.map_shape),
             "chunk": layout.chunk,
