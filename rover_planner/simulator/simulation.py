@@ -23,9 +23,9 @@ from rover_planner.simulator.second_try import MAX_TRIES, STUCK_TIME, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 if TYPE_CHECKING:
-    from rover_planner.simulator.mujoco_plant import MujocoPlant
+    from rover_planner.simulator.mujoco_rover import MujocoRover
 
-Plant: TypeAlias = "QuasiStaticPlant | MujocoPlant"
+Plant: TypeAlias = "QuasiStaticPlant | MujocoRover"
 """A simulated rover; all have the same methods."""
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
 """Width and cell size of the generated terrain [m], the default terrain."""
@@ -94,12 +94,12 @@ def make_plant(settings: SimulationSettings) -> Plant:
             "servos hold speeds"
         )
     try:
-        from rover_planner.simulator.mujoco_plant import MujocoPlant
+        from rover_planner.simulator.mujoco_rover import MujocoRover
     except ImportError:
         raise PlanningError(
             "engine is mujoco, which is not installed: pip install 'rover_planner[bench]'"
         ) from None
-    return MujocoPlant(*placed)
+    return MujocoRover(*placed)
 
 
 class Simulation:

@@ -177,9 +177,9 @@ def test_slip_is_seen_without_any_torque_and_measures_nothing():
 
 def drive_up(friction: float, degrees: float, seconds: float) -> np.ndarray:
     """Return rows of a drive up a slope in MuJoCo by speed servos, from just before it."""
-    simulator = pytest.importorskip("rover_planner.simulator.mujoco_plant")
+    simulator = pytest.importorskip("rover_planner.simulator.mujoco_rover")
     ground, rows = drive_ground("slope", degrees), []
-    plant = simulator.MujocoPlant(ROVER, ground, (-0.5, 0.0, 0.0), friction)
+    plant = simulator.MujocoRover(ROVER, ground, (-0.5, 0.0, 0.0), friction)
     for time in np.arange(0.0, seconds, 0.02):
         plant.drive(SPEED, 0.0, 0.02)
         rows.append(row_of_plant(plant, time))

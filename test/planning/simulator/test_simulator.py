@@ -13,7 +13,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.planning.angles import wrap
 from rover_planner.simulator.driving_forces import find_driving_forces
-from rover_planner.simulator.mujoco_plant import MujocoPlant
+from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
@@ -25,7 +25,7 @@ from support.rovers import FIXED, LSR1
 
 STEP, SPEED = 0.02, 0.06
 WAVY, LEVEL = make_terrain(waves, half=3.0), plane(0.0, 0.0, half=3.0)
-ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
+ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoRover])
 
 
 def drive(plant, seconds: float, speed: float = SPEED, yaw_rate: float = 0.0):
@@ -182,7 +182,7 @@ def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
 
 def test_both_engines_drive_the_same_way():
     start = (-1.0, 0.2, 0.0)
-    still, moving = QuasiStaticPlant(LSR1, WAVY, start), MujocoPlant(LSR1, WAVY, start)
+    still, moving = QuasiStaticPlant(LSR1, WAVY, start), MujocoRover(LSR1, WAVY, start)
     states = [drive(plant, 3.0) for plant in (still, moving)]
     assert states[1].position == pytest.approx(states[0].position, abs=0.04)
     for name in SUSPENSION_JOINTS:
@@ -321,7 +321,7 @@ def drive_along(plant, path):
     return max(away), np.array(poses), states
 
 
-@pytest.mark.parametrize(("engine", "side"), [(QuasiStaticPlant, 1.0), (MujocoPlant, -1.0)])
+@pytest.mark.parametrize(("engine", "side"), [(QuasiStaticPlant, 1.0), (MujocoRover, -1.0)])
 def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
     plant = engine(LSR1, LEVEL, (0.0, 0.0, 0.0))
     path = arc(side * 1.2, side * 0.6)
