@@ -56,7 +56,7 @@ class WheelContacts:
 
 
 class MujocoRover:
-    """One rover on one terrain, moved by speeds or torques; with fixed wheels it skids in curves."""
+    """A rover on one terrain, moved by speeds or torques; with fixed wheels it skids in curves."""
 
     def __init__(
         self,

@@ -255,7 +255,7 @@ class QuasiStaticPlant:
             self._stopped = reason
             self._stand(duration)
             return
-        self._before, self._here = self._here, _last_row(moved)
+        self._before, self._here = self._here, moved.select(slice(-1, None))
         self._pose, self._moved, self._angles = there, motion, angles
         self._duration = duration
         moved_by = self._here.wheel_centres[0] - self._before.wheel_centres[0]
@@ -342,11 +342,6 @@ class QuasiStaticPlant:
             wheel_torques=self._torques.copy(),
             stopped=self._stopped,
         )
-
-
-def _last_row(prediction: PathPrediction) -> PathPrediction:
-    """Return a prediction that has only the last waypoint."""
-    return prediction.select(slice(-1, None))
 
 
 def _suspension(prediction: PathPrediction) -> Floats:

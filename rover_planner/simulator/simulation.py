@@ -18,7 +18,7 @@ from rover_planner.parameters.rover_simulator import MUJOCO, RoverSimulatorParam
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from rover_planner.simulator.range_sensor import RangeSensor
+from rover_planner.simulator.range_sensor import look
 from rover_planner.simulator.second_try import MAX_TRIES, STUCK_TIME, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
@@ -113,7 +113,6 @@ class Simulation:
         """
         self.settings, asked = settings, settings.parameters
         self.plant = make_plant(settings)
-        self._sensor = RangeSensor(asked)
         self._rng = np.random.default_rng(asked.seed)
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
@@ -201,4 +200,5 @@ class Simulation:
             position: (3,) body origin [m].
             yaw: Heading [rad].
         """
-        return self._sensor.look(self.settings.terrain, position, self._rng, yaw)
+        known = self.settings
+        return look(known.parameters, known.terrain, position, yaw, self._rng)

@@ -12,11 +12,11 @@ from rover_physics.traction.balance import BalanceWriter
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.planning.angles import wrap
+from rover_planner.simulator import range_sensor
 from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, waves
@@ -227,7 +227,7 @@ def look(ground, **changes):
     values = {"range": 2.0, "noise": 0.0, "height": 0.8, "occlusion": True} | changes
     asked = RoverSimulatorParameters(**{f"sensor_{key}": value for key, value in values.items()})
     position, rng = np.array([0.0, 0.0, 0.3]), np.random.default_rng(1)
-    return RangeSensor(asked).look(ground, position, rng)
+    return range_sensor.look(asked, ground, position, 0.0, rng)
 
 
 def test_the_sensor_sees_the_ground_in_its_range_and_no_farther():
