@@ -80,18 +80,18 @@ def learn(
             "or too short"
         )
     write_learned(out, describe(learner.estimate, told))
-    layers = learner.layers
+    friction, friction_std = learner.layers
     if ground is not None:
         from rover_physics.terrain.grid import save_terrain
 
-        known = layers.friction if map_.friction is None else map_.friction
-        friction_layer = np.where(np.isfinite(layers.friction), layers.friction, known)
+        known = friction if map_.friction is None else map_.friction
+        friction_layer = np.where(np.isfinite(friction), friction, known)
         learned_map = replace(map_, friction=friction_layer)
-        save_terrain(ground, learned_map, friction_std=layers.friction_std)
+        save_terrain(ground, learned_map, friction_std=friction_std)
     if picture is not None:
         from rover_planner.figures.learning_picture import draw_learning
 
-        draw_learning(picture, map_, np.array(places), estimates, layers.friction)
+        draw_learning(picture, map_, np.array(places), estimates, friction)
     found = learner.estimate.friction
     high = "not bounded above" if found.high is None else f"at most {found.high:.2f}"
     if learner.estimate.soil is not None:
