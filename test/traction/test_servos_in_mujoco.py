@@ -74,7 +74,7 @@ def rest_on_slope(rover: Rover, half: float, policy: str, event: str, seconds: f
     while plant.time < LOST + seconds:
         over = plant.time > LOST
         if ENABLED < plant.time <= LOST:
-            supervisor.permission.set_enabled(True)
+            supervisor.set_enabled(True)
         lost, service, now = event if over else "", supervisor.service, plant.time
         if lost != "wheel rates":
             service.take_joints(plant.joint_positions, plant.joint_velocities, now)
