@@ -2,7 +2,6 @@
 """The simulation without ROS: drives a plant along a path, by speeds or by torques."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -44,20 +43,10 @@ class SimulationSettings:
     parameters: RoverSimulatorParameters
     """The parameters; empty texts and 0 stand for "as rover and terrain say"."""
 
-    @cached_property
-    def ground(self) -> Terrain:
-        """The true ground with the gaps that a server may interpolate: there is ground there."""
-        return self.terrain.fill_gaps(WIDEST_GAP)
-
     @property
     def start(self) -> tuple[float, float, float]:
         """x, y [m] and yaw [rad] of the body origin at the start."""
         return self.parameters.start_x, self.parameters.start_y, self.parameters.start_yaw
-
-    @property
-    def speed(self) -> float:
-        """Speed along a path [m/s]."""
-        return self.parameters.speed or self.rover.nominal_speed
 
 
 def load_simulation_settings(parameters: RoverSimulatorParameters) -> SimulationSettings:
@@ -83,7 +72,8 @@ def make_plant(settings: SimulationSettings) -> Plant:
         SoilError: No soil of that name.
     """
     asked = settings.parameters
-    placed = settings.rover, settings.ground, settings.start, asked.friction or None
+    ground = settings.terrain.fill_gaps(WIDEST_GAP)  # in gaps that a server may interpolate, too
+    placed = settings.rover, ground, settings.start, asked.friction or None
     if asked.engine != MUJOCO:
         return QuasiStaticPlant(*placed, asked.policy, asked.soil or None)
     if asked.soil:
@@ -187,7 +177,8 @@ class Simulation:
     def _steer(self, now: float) -> tuple[float, float]:
         if self._follower is not None:
             pose = self.plant.pose()
-            wanted = self._follower.steer(pose, self.settings.speed, now - self._held)
+            speed = self.settings.parameters.speed or self.settings.rover.nominal_speed
+            wanted = self._follower.steer(pose, speed, now - self._held)
             if self._follower.has_arrived(pose):
                 self._follower, self.at_end = None, True
             return wanted

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Control loops around the torque allocation: speed, heading, slip, stall and torque rate."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
@@ -126,9 +126,9 @@ class WheelRates:
     """(4,) angles of rockers and bogies [rad]."""
     wanted: float
     """Wanted mean rate [rad/s]."""
-    from_map: bool = False
+    from_map: bool
     """True if the ratios come from a map; from motion they may miss a face."""
-    level_ratios: Floats = field(default_factory=lambda: np.ones(WHEEL_COUNT))
+    level_ratios: Floats
     """(6,) speeds of the wheels over their mean on level ground, 1 straight ahead."""
 
 
