@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
@@ -29,10 +28,6 @@ class DrivingForces:
     """(6,) friction utilisation; 1 for a sliding wheel."""
     sliding: NDArray[np.bool_]
     """(6,) True if the motor's force exceeds the friction limit."""
-
-    def name_sliding(self) -> str:
-        """Return the names of the sliding wheels, separated by commas."""
-        return ", ".join(name for name, slides in zip(WHEELS, self.sliding, strict=True) if slides)
 
 
 def find_driving_forces(
