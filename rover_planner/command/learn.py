@@ -85,18 +85,17 @@ def learn(
     with errors_of(out, PlanningError):
         contents = json.dumps(describe(learner.estimate, told), indent=1)
         write_file(out, f"{contents}\n".encode())
-    friction, friction_std = learner.layers
+    mean, std = learner.layers
     if ground is not None:
         from rover_physics.terrain.grid import save_terrain
 
-        known = friction if map_.friction is None else map_.friction
-        friction_layer = np.where(np.isfinite(friction), friction, known)
-        learned_map = replace(map_, friction=friction_layer)
-        save_terrain(ground, learned_map, friction_std=friction_std)
+        known = mean if map_.friction is None else map_.friction
+        learned_map = replace(map_, friction=np.where(np.isfinite(mean), mean, known))
+        save_terrain(ground, learned_map, friction_std=std)
     if picture is not None:
         from rover_planner.figures.learning_picture import draw_learning
 
-        draw_learning(picture, map_, np.array(places), estimates, friction)
+        draw_learning(picture, map_, np.array(places), estimates, mean)
     found = learner.estimate.friction
     high = "not bounded above" if found.high is None else f"at most {found.high:.2f}"
     if learner.estimate.soil is not None:
