@@ -105,11 +105,8 @@ class _Results:
     """Writes answers to a folder: messages, predictions and maps."""
 
     def __init__(self, folder: Path, work: "Replay", bag: "BagWriter"):
-        from rover_physics.rover.rover_file import load_rover
-
-        self._folder, self._work, self._bag = folder, work, bag
-        self._parameters = work.parameters
-        self._rover = load_rover(work.parameters.rover)
+        self._folder, self._inputs, self._bag = folder, work.inputs, bag
+        self._settings = work.inputs.service.settings
         self._maps: dict[str, str] = {}
         self.count = 0
         """Number of answers."""
@@ -148,19 +145,17 @@ class _Results:
         """Write prediction and measurements of an answer; return their entries of the report."""
         from rover_physics.files.npz_file import write_npz
         from rover_planner.command.prediction_files import write_prediction
-        from rover_planner.planning.answering.service_settings import load_service_settings
         from rover_planner.planning.assumptions import assume
 
         candidate = answer.judgement.candidate
         if candidate is None or answer.terrain is None:
             return {}
-        file = f"{name}.npz"
-        query = load_service_settings(self._parameters).query
+        file, query = f"{name}.npz", self._settings.query
         write_prediction(
             self._folder / file,
             candidate.prediction,
             candidate.verdict,
-            assumptions=assume(self._rover, query.model, query.map_sigmas),
+            assumptions=assume(self._settings.rover, query.model, query.map_sigmas),
         )
         entries: dict[str, Any] = {
             "prediction": file,
@@ -183,10 +178,10 @@ class _Results:
         messages = ResultMessages(
             answer.judgement,
             answer.identity,
-            Header(frame_id=self._parameters.map_frame, stamp=ns_to_stamp(answer.stamp)),
-            self._rover,
-            self._parameters,
-            self._work.inputs,
+            Header(frame_id=self._settings.parameters.map_frame, stamp=ns_to_stamp(answer.stamp)),
+            self._settings.rover,
+            self._settings.parameters,
+            self._inputs,
         )
         for topic in RESULT_KINDS:
             self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
