@@ -22,10 +22,9 @@ from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.measurements import MAX_AGE
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.answering.traverse_service import MAX_AGE, TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
 
