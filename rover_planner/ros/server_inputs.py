@@ -91,8 +91,7 @@ class ServerInputs:
             RoverError: A value is wrong, or the frame is not known.
         """
         pose, _ = self.frames.take_odometry(odometry)
-        z, roll, pitch = pose[2:5].tolist()
-        self.service.take_pose(pose[[0, 1, 5]], (z, roll, pitch))
+        self.service.take_pose(pose)
 
     def find_here(self, max_age: float = MAX_AGE) -> Floats | None:
         """Return the pose (3,) of the body by /tf, else by odometry that is not older [s].

@@ -52,7 +52,6 @@ class TraverseService:
         self._joint_times: dict[str, float] = {}
         self._pose: NDArray[np.float64] | None = None
         self._pose_time = -np.inf
-        self._body: tuple[float, float, float] | None = None
         self._tilt: tuple[float, float] | None = None
         self._tilt_time = -np.inf
 
@@ -82,14 +81,9 @@ class TraverseService:
         self._joints.update(positions)
         self._joint_times.update(dict.fromkeys(positions, self._clock()))
 
-    def take_pose(
-        self, pose: NDArray[np.float64], body: tuple[float, float, float] | None = None
-    ) -> None:
-        """Keep the measured pose (3,) x, y [m], yaw [rad] of the body, map frame.
-
-        `body` is z [m], roll and pitch [rad] of the body at the same time; None: not measured.
-        """
-        self._pose, self._pose_time, self._body = pose, self._clock(), body
+    def take_pose(self, pose: NDArray[np.float64]) -> None:
+        """Keep the measured x, y, z [m], roll, pitch, yaw [rad] (6,) of the body, map frame."""
+        self._pose, self._pose_time = pose, self._clock()
 
     def take_tilt(self, roll: float, pitch: float) -> None:
         """Keep roll and pitch [rad] of the body, measured by an IMU."""
@@ -102,27 +96,27 @@ class TraverseService:
         """
         now = self._clock()
         times = [self._joint_times.get(name, -np.inf) for name in SUSPENSION_JOINTS]
-        pose, body = self._pose, self._body
-        if pose is None or body is None or now - min(*times, self._pose_time) > MAX_AGE:
+        if self._pose is None or now - min(*times, self._pose_time) > MAX_AGE:
             return None
+        x, y, z, roll, pitch, yaw = self._pose.tolist()
         if self._tilt is not None:
             if now - self._tilt_time > MAX_AGE:
                 return None
-            body = body[0], *self._tilt
+            roll, pitch = self._tilt
         suspension = {name: self._joints[name] for name in SUSPENSION_JOINTS}
-        x, y, yaw = pose.tolist()
-        return Standing(x, y, *body, yaw, suspension)
+        return Standing(x, y, z, roll, pitch, yaw, suspension)
 
     def fresh_pose(self, max_age: float = MAX_AGE) -> NDArray[np.float64] | None:
         """Return the pose (3,) x, y [m], yaw [rad] if it is not older than `max_age` [s]."""
-        return self._pose if self._clock() - self._pose_time <= max_age else None
+        if self._pose is None or self._clock() - self._pose_time > max_age:
+            return None
+        return self._pose[[0, 1, 5]]
 
     def pose_with_suspension(self) -> NDArray[np.float64] | None:
         """Return the pose (3,) if it and the suspension's angles are not older than MAX_AGE."""
         times = [at for name, at in self._joint_times.items() if name in SUSPENSION_JOINTS]
-        if not times or self._clock() - min(*times, self._pose_time) > MAX_AGE:
-            return None
-        return self._pose
+        is_fresh = bool(times) and self._clock() - min(times) <= MAX_AGE
+        return self.fresh_pose() if is_fresh else None
 
     def take_terrain(
         self,
