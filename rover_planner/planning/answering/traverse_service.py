@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
-from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain, fingerprint
 from rover_physics.terrain.ground import pack_ground
 from rover_planner.maps.ground_beneath import Standing
@@ -59,17 +59,6 @@ class TraverseService:
     def terrain(self) -> Terrain | None:
         """The last valid map, with small gaps interpolated if so set; None if there is none."""
         return None if self.known_map is None else self.known_map.terrain
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints whose angles are used: those of suspension and manipulator."""
-        return SUSPENSION_JOINTS + self.settings.manipulator_joints
-
-    @property
-    def all_joint_names(self) -> tuple[str, ...]:
-        """Names of all joints of the model: suspension, wheels, steering and manipulator."""
-        drive = SUSPENSION_JOINTS + WHEEL_JOINTS + STEERING_JOINTS
-        return drive + self.settings.manipulator_joints
 
     @property
     def joints(self) -> dict[str, float]:
