@@ -164,7 +164,7 @@ class PathWatch:
 
     def _send_stops(self) -> None:
         """Publish ~/stop each PERIOD and when it is new; a watch that hangs says nothing."""
-        while not self._life.is_over and self._node.context.ok():
+        while self._life.stopped is None and self._node.context.ok():
             if self._is_alive:
                 self._node.guard.call(lambda: self._stop.publish(Bool(data=self._stops)))
             self._stop_is_new.wait(PERIOD)
@@ -215,8 +215,8 @@ class PathWatch:
         self._rehearse()
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._sight is not None or self._life.is_over)
-                if self._life.is_over:
+                self._changed.wait_for(lambda: self._sight or self._life.stopped)
+                if self._life.stopped is not None:
                     return
                 sight, path = self._sight, self._new_path
                 self._sight = self._new_path = None
