@@ -175,7 +175,7 @@ class TractionMaps(MapIntake):
         rover: Callable[[], Rover],
         frames: NodeFrames,
     ):
-        """Start the thread.
+        """Begin without a map.
 
         Args:
             node: The node.
