@@ -178,7 +178,7 @@ class _Results:
         from std_msgs.msg import Header
 
         from msg_adapters.stamps import ns_to_stamp
-        from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
+        from rover_planner.nodes.result_topics import RESULTS, ResultMessages
 
         messages = ResultMessages(
             answer.judgement,
@@ -188,8 +188,8 @@ class _Results:
             self._parameters,
             self._work.inputs,
         )
-        for topic in RESULT_KINDS:
-            self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
+        for topic, (_, make) in RESULTS.items():
+            self._bag.write(f"/traverse_server/{topic}", make(messages), answer.stamp)
 
 
 def _read_parameters(path: Path | None, given: dict[str, Any]) -> "TraverseServerParameters":
