@@ -32,11 +32,6 @@ from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import describe_path
 
-Publish = Callable[[PathJudgement, IdentityReport], Any]
-ReadPath = Callable[[Path], GivenPath]
-ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
-
-
 ERRORS = {
     "": "NONE",
     "off_map": "GOAL_OUTSIDE_MAP",
@@ -55,9 +50,9 @@ class Nav2Services:
         self,
         node: Node,
         desk: QuestionDesk,
-        read_path: ReadPath,
-        read_question: ReadQuestion,
-        publish: Publish,
+        read_path: Callable[[Path], GivenPath],
+        read_question: Callable[[str, PoseStamped, PoseStamped], Question],
+        publish: Callable[[PathJudgement, IdentityReport], Any],
     ):
         """Create service and action, where their types are installed.
 

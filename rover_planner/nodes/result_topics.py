@@ -111,9 +111,8 @@ class ResultTopics:
 
     def serve_late_comers(self) -> None:
         """Publish the last results to new subscribers."""
-        awaited = [topic for topic in self._topics.values() if topic.is_awaited]
-        if awaited:
-            self._deferred_work.do(*(topic.catch_up for topic in awaited))
+        for topic in self._topics.values():
+            topic.catch_up()
 
 
 @dataclass(frozen=True)

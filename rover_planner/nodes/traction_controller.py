@@ -83,7 +83,10 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
         self._create_switches()
         self._watchdog = Watchdog(self._send_watchdog_command)
-        self.follow_changes(self._load, self._apply_settings)
+        self.follow_changes(
+            lambda changed: load_traction_settings(changed, self.service.settings),
+            self._apply_settings,
+        )
         self._timer = self.loop = create_steady_timer(self, 1.0 / values.rate, self.update)
         create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self.get_logger().info(
@@ -125,9 +128,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self.create_service(SetBool, "~/enable", self._enable)
         for qos in (topic_qos(), latched_qos(), sensor_qos()):
             self.heard.subscribe(Bool, "~/emergency_stop", self._take_emergency_stop, qos)
-
-    def _load(self, parameters: TractionControllerParameters) -> TractionSettings:
-        return load_traction_settings(parameters, self.service.settings)
 
     def _apply_settings(self, settings: TractionSettings) -> None:
         values = self.values
