@@ -16,7 +16,7 @@ from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.paths import decimate, settled_path
 from msg_adapters.results.diagnostics import verdict_to_diagnostics
-from msg_adapters.results.grids import area_to_grid
+from msg_adapters.results.grids import NOT_REACHED, REACHED, occupancy_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import joint_trajectory, tip_over_array, wheel_array
 from msg_adapters.stamps import ns_to_stamp
@@ -170,7 +170,8 @@ class ResultMessages:
             return OccupancyGrid(header=self.header)
         cell, (column, row) = around.nodes.cell, around.nodes.first
         first = cell * column, cell * row
-        return area_to_grid(around.closed.places, cell, first, self.header)
+        values = np.where(around.closed.places, REACHED, NOT_REACHED)
+        return occupancy_grid(values, cell, first, self.header)
 
     def joints(self) -> JointTrajectory:
         """Return the predicted joints, without points if no path was judged."""

@@ -13,7 +13,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
 from std_msgs.msg import Header
 
-from msg_adapters.results.grids import classes_to_grid
+from msg_adapters.results.grids import VALUES, occupancy_grid
 from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
@@ -213,4 +213,4 @@ class _Shown:
             classes = view.worst() if name == "worst" else view.best()
         else:
             classes = view.classes[int(name.removeprefix("heading_"))]
-        return classes_to_grid(classes, view.resolution, view.origin, self.header)
+        return occupancy_grid(VALUES[classes], view.resolution, view.origin, self.header)
