@@ -152,34 +152,25 @@ def _find_corners(poses: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.flatnonzero(changes) + 1
 
 
-def settled_path(
-    prediction: PathPrediction,
-    rows: ArrayLike,
-    header: Header,
-    stock: list[PoseStamped] | None = None,
-) -> Path:
+def settled_path(prediction: PathPrediction, rows: ArrayLike, header: Header) -> Path:
     """Convert settled waypoints of a prediction into a path with the body's full orientation.
 
     Args:
         prediction: Prediction of n waypoints.
         rows: Indices of the waypoints to write, in order; all must have settled.
         header: Frame and stamp of the path and of every pose.
-        stock: Poses to reuse: filling one takes a tenth of the time of making one. The list grows
-            as needed. One message must be sent before the next one is made from it.
     """
     rows = np.asarray(rows, dtype=np.intp)
-    stock = [] if stock is None else stock
-    stock.extend(PoseStamped() for _ in range(len(rows) - len(stock)))
-    path = Path(header=header, poses=stock[: len(rows)])
     rotations = xyzw_from_rpy(
         prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]
-    ).tolist()
-    values = zip(prediction.position[rows].tolist(), rotations, strict=True)
-    for stamped, (xyz, xyzw) in zip(path.poses, values, strict=True):
+    )
+    path = Path(header=header)
+    for xyz, xyzw in zip(prediction.position[rows].tolist(), rotations.tolist(), strict=True):
+        stamped = PoseStamped(header=header)
         place, turn = stamped.pose.position, stamped.pose.orientation
-        stamped.header = header
         place.x, place.y, place.z = xyz
         turn.x, turn.y, turn.z, turn.w = xyzw
+        path.poses.append(stamped)
     return path
 
 

@@ -2,12 +2,11 @@
 """Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, Header
@@ -37,8 +36,6 @@ WHEEL_TOPICS = {
     "torque_saturation": "torque_saturation",
 }
 """Topics with one value per waypoint and wheel, and the field of the prediction on each."""
-MAX_STOCK = 2000
-"""Number of pose messages that are kept for reuse."""
 SET_BACK = 1_000_000_000
 """Time [ns] up to which a clock that was set back counts as standing still."""
 
@@ -50,42 +47,30 @@ class ResultTopics:
         """Create the topics; `inputs` know the rover, and joints and frame of messages."""
         self._node, self._inputs = node, inputs
         self._deferred_work = DeferredWork(node, node.guard)
-        self._poses: list[PoseStamped] = []
         self._stamp = 0
         self._topics = {
             name: LazyPublisher(node, kind, f"~/{name}") for name, (kind, _) in RESULTS.items()
         }
 
-    def take(
-        self, judgement: PathJudgement, identity: IdentityReport
-    ) -> tuple[Path, Callable[[], VerdictReport]]:
-        """Return plan and report of a judgement; publish all results after the answer is sent.
+    def take(self, judgement: PathJudgement, identity: IdentityReport) -> "ResultMessages":
+        """Return the messages of a judgement; publish them after the answer is sent.
 
         Args:
             judgement: The answer.
             identity: What it is about; without a path, that of the plan is added.
-
-        Returns:
-            The plan, whose poses are valid until the next plan is made, and a function that
-            returns the report.
         """
         values, rover = self._node.values, self._inputs.service.settings.rover
         header = Header(frame_id=values.map_frame, stamp=ns_to_stamp(self._next_stamp()))
-        results = ResultMessages(
-            judgement, identity, header, rover, values, self._inputs, self._poses
-        )
-        plan = results.plan()
+        results = ResultMessages(judgement, identity, header, rover, values, self._inputs)
         if judgement.traversable and not identity.path_hash:
-            path_hash, path_stamp = describe_path(plan)
-            identity = replace(identity, path_hash=path_hash, path_stamp=path_stamp)
-            results = replace(results, identity=identity)
+            path_hash, path_stamp = describe_path(results.plan)
+            results.identity = replace(identity, path_hash=path_hash, path_stamp=path_stamp)
         publications = [
             partial(self._topics[name].publish, partial(make, results))
             for name, (_, make) in RESULTS.items()
         ]
-        log = partial(self._log, results)
-        self._deferred_work.do(log, *publications, self._shrink_stock)
-        return plan, lambda: results.report
+        self._deferred_work.do(partial(self._log, results), *publications)
+        return results
 
     def _next_stamp(self) -> int:
         """Return the ROS time [ns], or just after the last stamp if the clock stands still.
@@ -96,10 +81,6 @@ class ResultTopics:
         stands = self._stamp - SET_BACK < now <= self._stamp
         self._stamp = self._stamp + 1 if stands else now
         return self._stamp
-
-    def _shrink_stock(self) -> None:
-        """Drop messages beyond MAX_STOCK, which a long path has left behind."""
-        del self._poses[MAX_STOCK:]
 
     def _log(self, results: "ResultMessages") -> None:
         judgement, about = results.judgement, results.identity
@@ -115,7 +96,7 @@ class ResultTopics:
             topic.catch_up()
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class ResultMessages:
     """The messages of one judgement; each is made on demand."""
 
@@ -131,8 +112,6 @@ class ResultMessages:
     """Parameters of the messages."""
     inputs: ServerInputs
     """Know joints and frames of messages."""
-    poses: list[PoseStamped] = field(default_factory=list)
-    """Poses to reuse."""
 
     @property
     def prediction(self) -> PathPrediction | None:
@@ -145,13 +124,14 @@ class ResultMessages:
         """The report, with what it is about."""
         return replace(self.judgement.report, identity=self.identity)
 
+    @cached_property
     def plan(self) -> Path:
-        """Return the path to drive, without poses if none is traversable."""
+        """The path to drive, without poses if none is traversable."""
         candidate = self.judgement.candidate
         if candidate is None or not self.judgement.traversable:
             return Path(header=self.header)
         return self.inputs.frames.to_base(
-            settled_path(candidate.prediction, self._rows_to_show(), self.header, self.poses)
+            settled_path(candidate.prediction, self._rows_to_show(), self.header)
         )
 
     def verdict(self) -> DiagnosticArray:
@@ -205,7 +185,7 @@ def _of_wheels(field: str) -> tuple[type, Maker]:
 
 
 RESULTS: dict[str, tuple[type, Maker]] = {
-    "plan": (Path, ResultMessages.plan),
+    "plan": (Path, lambda one: one.plan),
     **{topic: _of_wheels(field) for topic, field in WHEEL_TOPICS.items()},
     "tip_over_margin": (Float64MultiArray, lambda one: tip_over_array(one.prediction)),
     "predicted_joints": (JointTrajectory, ResultMessages.joints),

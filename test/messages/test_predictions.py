@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Float64MultiArray, Header
 from visualization_msgs.msg import Marker
 
@@ -101,13 +100,6 @@ def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other
     reach = np.hypot([0.4, 0.0, 0.4], 0.31) / LSR1.wheel.radius
     assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)
     assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()
-
-
-def test_a_path_of_poses_filled_anew_is_the_same_as_one_of_new_poses(prediction):
-    stock: list[PoseStamped] = []
-    for rows in ([0, 10, 49], [5], range(50), [49, 48]):
-        path = settled_path(prediction, rows, HEADER, stock)
-        assert path == settled_path(prediction, rows, HEADER)
 
 
 def test_a_settled_path_has_height_and_full_orientation(prediction):
