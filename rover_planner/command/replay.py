@@ -49,7 +49,7 @@ def replay(
     need("rclpy", "replay")
     need("rosbags", "replay")
     from rover_planner.ros.bags import bag_files
-    from rover_planner.ros.bags.replay import Questions, Replay
+    from rover_planner.ros.bags.replay import Replay
     from rover_planner.shell.progress import show_bar
 
     if start is not None and goal is None:
@@ -57,8 +57,7 @@ def replay(
     if out.exists():
         raise PlanningError(f"{out} exists already; OUT must be a new folder")
     given = {"rover": rover, "map_frame": map_frame, "map_resolution": resolution}
-    questions = Questions(goal, start, stretch)
-    work = Replay(_read_parameters(parameters, given), questions)
+    work = Replay(_read_parameters(parameters, given), goal, start, stretch)
     topics = {
         bag_files.MAP: map_topic,
         bag_files.JOINTS: joints_topic,

@@ -82,7 +82,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         order = joint_order(values.joints, names)
         self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
         self._create_switches()
-        self._watchdog = Watchdog(self._send_watchdog_command)
+        self._watchdog = Watchdog(lambda: self._topics.write(np.zeros(WHEEL_COUNT), True, FAULT))
         self.follow_changes(
             lambda changed: load_traction_settings(changed, self.service.settings),
             self._apply_settings,
@@ -234,10 +234,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         period = 1.0 / self.values.rate
         next_update = now + max(self.values.watchdog_timeout, MIN_WATCHDOG_PERIODS * period)
         return min(next_update, max(command.expiry, now) + STALE_PERIODS * period)
-
-    def _send_watchdog_command(self) -> None:
-        """Send zero torques and the brake; called in the thread of the watchdog."""
-        self._topics.write(np.zeros(WHEEL_COUNT), True, FAULT)
 
     def _log_changes(self, command: TractionCommand, now: float) -> None:
         """Log the begin and the end of faults and stalls; show a new state in the diagnostics."""

@@ -223,7 +223,8 @@ class PathWatch:
             except QuestionStoppedError:
                 return
             except Exception as error:
-                finding = self._fail(error)
+                text = f"internal error: {self._node.guard.report('monitor', error)}"
+                finding = self._monitor.stop(refusal("internal_error", text))
             self._hand_over(finding, sight)
 
     def _look(self, sight: Sight, path: WatchedPath | None) -> Finding:
@@ -233,11 +234,6 @@ class PathWatch:
             logger = self._node.get_logger()
             logger.warning("monitor: the rover does not stand on the accepted path; not watched")
         return self._monitor.look(sight)
-
-    def _fail(self, error: Exception) -> Finding:
-        """Return that the rover is to stop because the rest of its path could not be judged."""
-        text = self._node.guard.report("monitor", error)
-        return self._monitor.stop(refusal("internal_error", f"internal error: {text}"))
 
     def _hand_over(self, finding: Finding, sight: Sight) -> None:
         """Publish a finding at once; classes of a stop's waypoints take longer and follow.
