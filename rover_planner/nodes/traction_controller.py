@@ -250,7 +250,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
             self._warning = command.warning
 
     def _publish_diagnostics(self) -> None:
-        self._maps.look_for_frame()
+        self._maps.retry()
         command = self._command
         if command is None:
             return

@@ -99,17 +99,13 @@ class MapIntake(ABC):
         if last is not None:
             self._do_latest(*last)
 
-    @property
-    def waits_for_frame(self) -> bool:
-        """True if no transform was known for the last message."""
-        return self._unplaced is not None
-
     def retry(self) -> None:
         """Prepare the last message again if its transform has come meanwhile; call it each second.
 
         A map that is published once may arrive before the first transform.
         """
         if self._unplaced is not None:
+            self._frames.listen()  # only then: /tf of a whole robot costs a loop its time
             with contextlib.suppress(TransformError):
                 self._frames.find(*self._unplaced)
                 self._unplaced = None
