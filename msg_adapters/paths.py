@@ -117,7 +117,7 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     spot, are chosen too, and some in the turn: between chosen poses the heading is interpolated.
 
     Args:
-        poses: (n, 2) or wider; x, y [m] and, for corners, yaw [rad].
+        poses: (n, 3) x, y [m] and yaw [rad].
         spacing: Distance between chosen poses [m]; 0 keeps all.
         always: Indices of other poses that are chosen in any case.
 
@@ -134,14 +134,13 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     marks = np.arange(0.0, travelled[-1], spacing)
     chosen = np.searchsorted(travelled, marks - 1e-9 * spacing)
     ends = [0, len(xy) - 1]
-    corners = _find_corners(values) if values.shape[1] > 2 else np.empty(0, np.intp)
-    others = np.concatenate([corners, np.asarray(always, np.intp)])
-    return np.unique(np.concatenate([ends, chosen, others])).astype(np.intp)
+    others = _find_corners(values), np.asarray(always, np.intp)
+    return np.unique(np.concatenate([ends, chosen, *others])).astype(np.intp)
 
 
 def _find_corners(poses: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the indices of poses (n, 3) between which the heading may not be interpolated."""
-    steps = np.diff(poses[:, :3], axis=0)
+    steps = np.diff(poses, axis=0)
     yaw = poses[:-1, 2]
     ahead = np.sign(steps[:, 0] * np.cos(yaw) + steps[:, 1] * np.sin(yaw))
     stands = np.hypot(steps[:, 0], steps[:, 1]) < STANDING

@@ -107,7 +107,6 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._map_cloud = MapCloud(self, self.service)
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
-        self.urgent_threads = (self.watch.heartbeat_thread,)
         self._hazards = HazardTopics(self, self.service, self.desk.give_way)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._diagnostics_due = 0.0

@@ -96,6 +96,8 @@ class PathWatch:
         self.apply()
         self._heartbeat = threading.Thread(target=self._send_stops, name="heartbeat", daemon=True)
         self._heartbeat.start()
+        assert self._heartbeat.native_id is not None
+        node.urgent_threads = (self._heartbeat.native_id,)
 
     def apply(self) -> None:
         """Follow the parameter `monitor`."""
@@ -119,12 +121,6 @@ class PathWatch:
         tolerance = self._service.settings.parameters.suspension_tolerance
         health = describe_watch(self.finding, self.enabled, tolerance)
         return replace(health, values={**health.values, "map_age": f"{self._map_age:.1f} s"})
-
-    @property
-    def heartbeat_thread(self) -> int:
-        """Id of the thread that sends the heartbeat."""
-        assert self._heartbeat.native_id is not None
-        return self._heartbeat.native_id
 
     @property
     def _stops(self) -> bool:
