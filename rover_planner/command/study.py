@@ -40,7 +40,7 @@ def study(
     try:
         output.mkdir(parents=True, exist_ok=True)
         result.write_csv(output / f"{file.stem}.csv")
-        best = write_rover(find_rover(task, result.best))
+        best = write_rover(find_rover(task, result.best.values))
         (output / f"{file.stem}_best.yaml").write_text(best, encoding="utf-8")
     except OSError as error:
         raise PlanningError(f"cannot write into {show_file(output)}: {error.strerror}") from None

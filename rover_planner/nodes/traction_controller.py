@@ -137,20 +137,19 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._maps.apply(values)
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        before = self._supervisor.permission.enabled
-        done, message = self._supervisor.permission.set_enabled(request.data)
+        before = self._supervisor.enabled
+        done, message = self._supervisor.set_enabled(request.data)
         response.success, response.message = done, message
-        if self._supervisor.permission.enabled != before or not done:
+        if self._supervisor.enabled != before or not done:
             self.get_logger().info(message)
             self._repeats = MOST_REPEATS  # the next update is a whole one
             self.update()
         return response
 
     def _take_emergency_stop(self, message: Bool, _arrival: float) -> None:
-        permission = self._supervisor.permission
-        if message.data == permission.emergency_stop:
+        if message.data == self._supervisor.emergency_stop:
             return
-        permission.take_emergency_stop(message.data)
+        self._supervisor.take_emergency_stop(message.data)
         self.get_logger().warning(
             "emergency stop" if message.data else "emergency stop released; ~/enable drives again"
         )

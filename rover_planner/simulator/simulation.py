@@ -2,7 +2,6 @@
 """The simulation without ROS: drives a plant along a path, by speeds or by torques."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -18,14 +17,14 @@ from rover_planner.parameters.rover_simulator import MUJOCO, RoverSimulatorParam
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from rover_planner.simulator.range_sensor import RangeSensor
+from rover_planner.simulator.range_sensor import look
 from rover_planner.simulator.second_try import MAX_TRIES, STUCK_TIME, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 if TYPE_CHECKING:
-    from rover_planner.simulator.mujoco_plant import MujocoPlant
+    from rover_planner.simulator.mujoco_rover import MujocoRover
 
-Plant: TypeAlias = "QuasiStaticPlant | MujocoPlant"
+Plant: TypeAlias = "QuasiStaticPlant | MujocoRover"
 """A simulated rover; all have the same methods."""
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
 """Width and cell size of the generated terrain [m], the default terrain."""
@@ -44,20 +43,10 @@ class SimulationSettings:
     parameters: RoverSimulatorParameters
     """The parameters; empty texts and 0 stand for "as rover and terrain say"."""
 
-    @cached_property
-    def ground(self) -> Terrain:
-        """The true ground with the gaps that a server may interpolate: there is ground there."""
-        return self.terrain.fill_gaps(WIDEST_GAP)
-
     @property
     def start(self) -> tuple[float, float, float]:
         """x, y [m] and yaw [rad] of the body origin at the start."""
         return self.parameters.start_x, self.parameters.start_y, self.parameters.start_yaw
-
-    @property
-    def speed(self) -> float:
-        """Speed along a path [m/s]."""
-        return self.parameters.speed or self.rover.nominal_speed
 
 
 def load_simulation_settings(parameters: RoverSimulatorParameters) -> SimulationSettings:
@@ -83,7 +72,8 @@ def make_plant(settings: SimulationSettings) -> Plant:
         SoilError: No soil of that name.
     """
     asked = settings.parameters
-    placed = settings.rover, settings.ground, settings.start, asked.friction or None
+    ground = settings.terrain.fill_gaps(WIDEST_GAP)  # in gaps that a server may interpolate, too
+    placed = settings.rover, ground, settings.start, asked.friction or None
     if asked.engine != MUJOCO:
         return QuasiStaticPlant(*placed, asked.policy, asked.soil or None)
     if asked.soil:
@@ -94,12 +84,12 @@ def make_plant(settings: SimulationSettings) -> Plant:
             "servos hold speeds"
         )
     try:
-        from rover_planner.simulator.mujoco_plant import MujocoPlant
+        from rover_planner.simulator.mujoco_rover import MujocoRover
     except ImportError:
         raise PlanningError(
             "engine is mujoco, which is not installed: pip install 'rover_planner[bench]'"
         ) from None
-    return MujocoPlant(*placed)
+    return MujocoRover(*placed)
 
 
 class Simulation:
@@ -113,7 +103,6 @@ class Simulation:
         """
         self.settings, asked = settings, settings.parameters
         self.plant = make_plant(settings)
-        self._sensor = RangeSensor(asked)
         self._rng = np.random.default_rng(asked.seed)
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
@@ -188,7 +177,8 @@ class Simulation:
     def _steer(self, now: float) -> tuple[float, float]:
         if self._follower is not None:
             pose = self.plant.pose()
-            wanted = self._follower.steer(pose, self.settings.speed, now - self._held)
+            speed = self.settings.parameters.speed or self.settings.rover.nominal_speed
+            wanted = self._follower.steer(pose, speed, now - self._held)
             if self._follower.has_arrived(pose):
                 self._follower, self.at_end = None, True
             return wanted
@@ -201,4 +191,5 @@ class Simulation:
             position: (3,) body origin [m].
             yaw: Heading [rad].
         """
-        return self._sensor.look(self.settings.terrain, position, self._rng, yaw)
+        known = self.settings
+        return look(known.parameters, known.terrain, position, yaw, self._rng)
