@@ -49,7 +49,7 @@ def replay(
     need("rclpy", "replay")
     need("rosbags", "replay")
     from rover_planner.ros.bags import bag_files
-    from rover_planner.ros.bags.replay import Questions, Replay
+    from rover_planner.ros.bags.replay import Replay
     from rover_planner.shell.progress import show_bar
 
     if start is not None and goal is None:
@@ -57,8 +57,7 @@ def replay(
     if out.exists():
         raise PlanningError(f"{out} exists already; OUT must be a new folder")
     given = {"rover": rover, "map_frame": map_frame, "map_resolution": resolution}
-    questions = Questions(goal, start, stretch)
-    work = Replay(_read_parameters(parameters, given), questions)
+    work = Replay(_read_parameters(parameters, given), goal, start, stretch)
     topics = {
         bag_files.MAP: map_topic,
         bag_files.JOINTS: joints_topic,
@@ -173,7 +172,7 @@ class _Results:
         from std_msgs.msg import Header
 
         from msg_adapters.stamps import ns_to_stamp
-        from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
+        from rover_planner.nodes.result_topics import RESULTS, ResultMessages
 
         messages = ResultMessages(
             answer.judgement,
@@ -183,8 +182,8 @@ class _Results:
             self._settings.parameters,
             self._inputs,
         )
-        for topic in RESULT_KINDS:
-            self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
+        for topic, (_, make) in RESULTS.items():
+            self._bag.write(f"/traverse_server/{topic}", make(messages), answer.stamp)
 
 
 def _read_parameters(path: Path | None, given: dict[str, Any]) -> "TraverseServerParameters":

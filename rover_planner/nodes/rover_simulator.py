@@ -117,13 +117,13 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
-        qos, hear = topic_qos(), self.heard.subscribe
-        hear(Bool, STOP, self._take_stop, qos)
+        qos, hear, rover = topic_qos(), self.heard.subscribe, self.simulation
+        hear(Bool, STOP, lambda one, arrival: rover.take_stop(one.data, arrival), qos)
         hear(Path, "path", self._take_path, qos)
         hear(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
         if self.values.follow_commands:
             hear(Float64MultiArray, COMMANDS, self._take_torques, sensor_qos())
-            hear(Bool, BRAKE, self._take_brake, latched_qos())
+            hear(Bool, BRAKE, lambda one, _: rover.take_brake(one.data), latched_qos())
 
     def _take_path(self, path: Path, _arrival: float) -> None:
         self.simulation.take_path(path_to_poses(path, self._frame))
@@ -142,12 +142,6 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         torques = np.empty(6)
         torques[self._order] = efforts
         self.simulation.take_torques(torques, arrival)
-
-    def _take_brake(self, message: Bool, _arrival: float) -> None:
-        self.simulation.take_brake(message.data)
-
-    def _take_stop(self, message: Bool, arrival: float) -> None:
-        self.simulation.take_stop(message.data, arrival)
 
     def _advance(self) -> None:
         self.heard.poll()
