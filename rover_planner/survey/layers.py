@@ -68,8 +68,7 @@ def read_drawn_classes(store: Any) -> NDArray:
 
 def bits_type(headings: int) -> np.dtype:
     """Return the smallest unsigned type with a bit for each heading."""
-    bits = next(bits for bits in (8, 16, 32, 64) if bits >= headings)
-    return np.dtype(f"u{bits // 8}")
+    return np.min_scalar_type((1 << headings) - 1)
 
 
 def list_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.number]:
@@ -97,8 +96,7 @@ def pack_bits(passes: NDArray[np.bool_]) -> NDArray:
     """Return flags (..., headings) as whole numbers (...), heading k in bit k."""
     headings = passes.shape[-1]
     kind = bits_type(headings)
-    bits = kind.type(1) << np.arange(headings).astype(kind)
-    return np.asarray(np.bitwise_or.reduce(np.where(passes, bits, kind.type(0)), axis=-1))
+    return np.asarray(passes @ (kind.type(1) << np.arange(headings, dtype=kind)))
 
 
 def unpack_bits(bits: NDArray, headings: int) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.second_try import SecondTry
-from rover_planner.simulator.simulation import Simulation, SimulationSettings
+from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
 from support.rovers import FIXED, LSR1
@@ -146,7 +146,7 @@ def test_a_rover_that_stands_is_not_computed_again_and_nothing_else_changes(monk
 def test_drives_without_commands_are_braked():
     given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
     slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
-    simulation = Simulation(SimulationSettings(LSR1, slope, given))
+    simulation = Simulation(LSR1, slope, given)
 
     def roll(begin):
         return [simulation.advance(begin + STEP * k, STEP).velocity[0] for k in range(25)][-1]
@@ -162,7 +162,7 @@ def test_drives_without_commands_are_braked():
 
 def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
     given = RoverSimulatorParameters(start_x=-1.0, stop_timeout=0.4)
-    simulation = Simulation(SimulationSettings(LSR1, WAVY, given))
+    simulation = Simulation(LSR1, WAVY, given)
     simulation.take_path(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
 
     def speeds(begin, seconds):
@@ -217,7 +217,7 @@ def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_no
     hole = lambda x, y: waves(x, y) + np.where(np.hypot(x, y) < 0.3, np.nan, 0.0)  # noqa: E731
     ground = make_terrain(hole, half=3.0)
     given = RoverSimulatorParameters(start_x=-0.6)
-    simulation = Simulation(SimulationSettings(LSR1, ground, given))
+    simulation = Simulation(LSR1, ground, given)
     drive(simulation.plant, 13.0)
     assert simulation.plant.pose()[0] > 0.1  # a server that interpolates has let it pass
     assert np.isnan(simulation.look(simulation.plant.state().position, 0.0).elevation_at(0.0, 0.0))
