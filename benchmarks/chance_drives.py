@@ -15,8 +15,7 @@ import typer
 
 from benchmarks.chance import FAST, ChancePath, draw_path, draw_truths, read_driven_paths
 from benchmarks.drives import LOOK_AHEAD
-from rover_planner.simulator.mujoco_plant import MAX_TILT
-from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.simulator.mujoco_rover import MAX_TILT, MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from support.reference_drives import KEPT
 
@@ -40,13 +39,13 @@ def passes(path: ChancePath, friction: float, max_torque: float) -> bool:
     length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
     within, is_lost, way = round(ASKED_WAY / path.speed / PERIOD), False, [0.0]
     while follower.driven < length and not is_lost:
-        here = plant.pose[[0, 1, 3]]
+        here = plant.pose()
         speeds = plant.steer(follower.steer(here, rover.nominal_speed))
         plant.servo_with_droop(speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD)
         way.append(follower.driven)
         stands = len(way) > within and way[-1] - way[-1 - within] < STUCK_WAY
         is_lost = plant.tilt > MAX_TILT or stands
-    off = np.hypot(*(plant.pose[:2] - poses[-1, :2]))
+    off = np.hypot(*(plant.pose()[:2] - poses[-1, :2]))
     return not is_lost and bool(off <= KEPT)
 
 

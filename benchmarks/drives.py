@@ -14,8 +14,7 @@ from benchmarks.measure import console
 from rover_physics import Rover, Terrain, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.simulator.mujoco_plant import MAX_TILT
-from rover_planner.simulator.mujoco_rover import TIMESTEP, MujocoRover
+from rover_planner.simulator.mujoco_rover import MAX_TILT, TIMESTEP, MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.traction.settings import load_traction_settings
@@ -135,7 +134,7 @@ def make_controller(
         service.take_joints(plant.joint_positions, plant.joint_velocities, now)
         service.take_attitude(*plant.attitude, plant.body_rates, now)
         service.take_command(*command, now)
-        service.take_odometry(plant.pose, 0.0, now)
+        service.take_odometry(np.append(plant.position, plant.pose()[2]), 0.0, now)
         torques = service.update(now).torques
         plant.step(torques, PERIOD)
         return torques
@@ -158,10 +157,10 @@ def follow_axis(
     path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
     follower = SecondTry(PathFollower(path, LOOK_AHEAD), tries)
     control = make_controller(name, plant, obstacle)
-    while plant.time < most_time * (END - START) / SPEED and plant.pose[0] < END:
-        command = follower.steer(plant.pose[[0, 1, 3]], SPEED, plant.time)
+    while plant.time < most_time * (END - START) / SPEED and plant.pose()[0] < END:
+        command = follower.steer(plant.pose(), SPEED, plant.time)
         torques = control(command, plant.steer(command) / plant.rover.wheel.radius)
-        if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET or follower.given_up:
+        if plant.tilt > MAX_TILT or abs(plant.pose()[1]) > MAX_OFFSET or follower.given_up:
             return
         yield torques
 
@@ -189,8 +188,8 @@ def drive(
     if not peaks:
         raise ValueError(f"the rover cannot stand at the start of {obstacle.label}")
     return DriveResult(
-        passed=bool(plant.pose[0] >= END),
-        end=float(plant.pose[0]),
+        passed=bool(plant.pose()[0] >= END),
+        end=float(plant.pose()[0]),
         mean_utilisation=float(np.mean(peaks)),
         slip=float(slip),
         torque=float(torque / plant.time),

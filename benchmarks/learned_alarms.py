@@ -25,7 +25,7 @@ from rover_physics import Rover, Terrain, judge_poses
 from rover_planner.errors import PlanningError
 from rover_planner.learning.drive_log import RATES, TIME, YAW, X, Y
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
-from rover_planner.simulator.mujoco_plant import MujocoPlant
+from rover_planner.simulator.mujoco_rover import MujocoRover
 from support.learning_drives import row_of_plant
 from support.reference_drives import drive_ground
 
@@ -129,12 +129,12 @@ def follow(start: np.ndarray, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def drive(ground: Terrain, start: np.ndarray, parts: np.ndarray) -> Iterator[np.ndarray]:
     """Return rows of a drive without noise, slip speeds (n, 6) and commanded speeds (n,)."""
-    plant = MujocoPlant(told_rover(), ground, tuple(start.tolist()))
+    plant = MujocoRover(told_rover(), ground, tuple(start.tolist()))
     driven = []
     for speed, turn in commands_of(parts, PERIOD).tolist():
         plant.drive(speed, turn, PERIOD)
         row = row_of_plant(plant, (len(driven) + 1) * PERIOD)
-        driven.append((row, plant.simulated.measure_contacts().slip_speeds, speed))
+        driven.append((row, plant.measure_contacts().slip_speeds, speed))
         if plant.state().stopped:
             break
     return map(np.array, zip(*driven, strict=True))

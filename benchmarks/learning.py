@@ -153,14 +153,14 @@ def record(drive: LearningDrive) -> Recorded:
     obstacle, start = drive.obstacle, (START, 0.0, 0.0)
     plant = MujocoRover(obstacle.rover, drive.ground, start, drive.frictions[0], drive.timestep)
     rows = [row_of(plant) for _ in follow_axis(plant, obstacle, drive.controller, most_time=1.5)]
-    return Recorded(np.array(rows).reshape(-1, log.WIDTH), bool(plant.pose[0] >= END))
+    return Recorded(np.array(rows).reshape(-1, log.WIDTH), bool(plant.pose()[0] >= END))
 
 
 def row_of(plant: MujocoRover) -> np.ndarray:
     """Return what is measured now."""
     row = np.full(log.WIDTH, np.nan)
-    pose, joints = plant.pose, plant.joint_positions
-    row[[log.TIME, log.X, log.Y, log.YAW]] = plant.time, pose[0], pose[1], pose[3]
+    joints = plant.joint_positions
+    row[[log.TIME, log.X, log.Y, log.YAW]] = plant.time, *plant.pose()
     row[[log.ROLL, log.PITCH]] = plant.attitude
     row[log.SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
     row[log.RATES], row[log.TORQUES] = plant.wheel_rates, plant.wheel_torques

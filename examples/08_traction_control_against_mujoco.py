@@ -38,7 +38,7 @@ def drive(with_traction_control: bool) -> np.ndarray:
     plant = MujocoRover(load_rover("lsr1"), ground, (START, 0.0, 0.0), FRICTION)
     service = TractionService(load_traction_settings(TractionControllerParameters()))
     rates, rows = np.full(6, SPEED / plant.rover.wheel.radius), []
-    while plant.pose[0] < END and plant.time < 2.0 * (END - START) / SPEED:
+    while plant.pose()[0] < END and plant.time < 2.0 * (END - START) / SPEED:
         if with_traction_control:
             now = plant.time
             service.take_joints(plant.joint_positions, plant.joint_velocities, now)
@@ -49,7 +49,7 @@ def drive(with_traction_control: bool) -> np.ndarray:
         else:
             torques = plant.servo(rates, PERIOD)
         slip, power = plant.measure_contacts().slip_speeds, torques * plant.wheel_rates
-        rows.append((plant.pose[0], slip.mean(), np.abs(torques).mean(), power.clip(0.0).sum()))
+        rows.append((plant.pose()[0], slip.mean(), np.abs(torques).mean(), power.clip(0.0).sum()))
     return np.array(rows)
 
 

@@ -168,23 +168,22 @@ def terrain_to_point_cloud(
     terrain: Terrain,
     frame_id: str,
     stamp=None,
-    datatype: int = PointField.FLOAT32,
     more: Mapping[str, NDArray[Any]] | None = None,
 ) -> PointCloud2:
     """Convert a terrain into an organised cloud, one point per cell, row 0 first.
 
     Args:
-        terrain: Unknown cells become points with NaN height, so that the shape is kept.
+        terrain: Unknown cells become points with NaN height, so that the shape is kept. Values are
+            FLOAT32, which viewers can show and which rounds heights.
         frame_id: Frame of the map.
         stamp: builtin_interfaces/Time, zero if None.
-        datatype: PointField.FLOAT32, which viewers can show and which rounds heights, or FLOAT64.
         more: Further fields by name, (ny, nx) each.
     """
     rows, columns = terrain.elevation.shape
     fields = {name: getattr(terrain, layer) for name, layer in LAYERS.items()} | dict(more or {})
     layers = [name for name in fields if fields[name] is not None]
     names = ["x", "y", "z", *layers]
-    kind = np.dtype("<" + _FLOATS[datatype])
+    kind = np.dtype("<f4")
     values = np.empty((rows, columns, len(names)), kind)
     values[:, :, 0] = terrain.origin[0] + terrain.resolution * np.arange(columns)
     values[:, :, 1] = (terrain.origin[1] + terrain.resolution * np.arange(rows))[:, None]
@@ -196,7 +195,7 @@ def terrain_to_point_cloud(
     if stamp is not None:
         cloud.header.stamp = stamp
     cloud.fields = [
-        PointField(name=name, offset=i * kind.itemsize, datatype=datatype, count=1)
+        PointField(name=name, offset=i * kind.itemsize, datatype=PointField.FLOAT32, count=1)
         for i, name in enumerate(names)
     ]
     cloud.point_step = len(names) * kind.itemsize

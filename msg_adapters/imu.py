@@ -38,18 +38,6 @@ class ImuMounting:
         """Frame that its messages must have; one without a frame_id is taken as well."""
         self._turn = matrix_from_xyzw(xyzw_from_rpy(*rpy)) if any(rpy) else None
 
-    def check_frame(self, frame_id: str) -> None:
-        """Check the frame of a message.
-
-        Raises:
-            MessageError: It is another frame than that of the IMU.
-        """
-        if frame_id not in ("", self.frame_id):
-            raise MessageError(
-                f"imu is in frame {frame_id!r}; it must be in {self.frame_id!r}, or the "
-                "parameters imu_frame and imu_mounting must tell how it is mounted"
-            )
-
     def turn(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a vector (3,) in the body frame from one in the IMU's frame."""
         return vector if self._turn is None else self._turn @ vector
@@ -66,8 +54,12 @@ def imu_to_attitude(imu: Imu, mounting: ImuMounting | None = None) -> Attitude:
         MessageError: Another frame, no orientation, no unit quaternion, or values that are not
             finite.
     """
-    if mounting is not None:
-        mounting.check_frame(imu.header.frame_id)
+    frame = imu.header.frame_id
+    if mounting is not None and frame not in ("", mounting.frame_id):
+        raise MessageError(
+            f"imu is in frame {frame!r}; it must be in {mounting.frame_id!r}, or the parameters "
+            "imu_frame and imu_mounting must tell how it is mounted"
+        )
     if imu.orientation_covariance[0] == NOT_MEASURED:
         raise MessageError(
             "imu has no orientation (orientation_covariance[0] is -1); roll and pitch are needed"

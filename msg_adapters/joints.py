@@ -84,23 +84,19 @@ class JointNames:
             MessageError: position has another length than name, a wanted joint occurs twice, or
                 its position is not finite.
         """
-        values = self._read(state, state.position, "position", "angle in rad", wanted)
+        values = self._read(state, "position", "angle in rad", wanted)
         return {link.model: link.sign * value + link.offset for link, value in values}
 
     def velocities(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
         """Return the rates [rad/s] of wanted joints of the model; as `positions`."""
-        values = self._read(state, state.velocity, "velocity", "rate in rad/s", wanted)
+        values = self._read(state, "velocity", "rate in rad/s", wanted)
         return {link.model: link.sign * value for link, value in values}
 
     def _read(
-        self,
-        state: JointState,
-        values: Sequence[float],
-        field: str,
-        right: str,
-        wanted: Collection[str],
+        self, state: JointState, field: str, right: str, wanted: Collection[str]
     ) -> list[tuple[JointLink, float]]:
         """Return the values of wanted joints that a message has, with their links."""
+        values = getattr(state, field)
         if not values:
             return []
         if len(values) != len(state.name):

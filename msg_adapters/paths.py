@@ -3,10 +3,9 @@
 
 import math
 import struct
-from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from nav_msgs.msg import Path
 from numpy.typing import ArrayLike, NDArray
 from std_msgs.msg import Header
@@ -118,7 +117,7 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     spot, are chosen too, and some in the turn: between chosen poses the heading is interpolated.
 
     Args:
-        poses: (n, 2) or wider; x, y [m] and, for corners, yaw [rad].
+        poses: (n, 3) x, y [m] and yaw [rad].
         spacing: Distance between chosen poses [m]; 0 keeps all.
         always: Indices of other poses that are chosen in any case.
 
@@ -135,14 +134,13 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     marks = np.arange(0.0, travelled[-1], spacing)
     chosen = np.searchsorted(travelled, marks - 1e-9 * spacing)
     ends = [0, len(xy) - 1]
-    corners = _find_corners(values) if values.shape[1] > 2 else np.empty(0, np.intp)
-    others = np.concatenate([corners, np.asarray(always, np.intp)])
-    return np.unique(np.concatenate([ends, chosen, others])).astype(np.intp)
+    others = _find_corners(values), np.asarray(always, np.intp)
+    return np.unique(np.concatenate([ends, chosen, *others])).astype(np.intp)
 
 
 def _find_corners(poses: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the indices of poses (n, 3) between which the heading may not be interpolated."""
-    steps = np.diff(poses[:, :3], axis=0)
+    steps = np.diff(poses, axis=0)
     yaw = poses[:-1, 2]
     ahead = np.sign(steps[:, 0] * np.cos(yaw) + steps[:, 1] * np.sin(yaw))
     stands = np.hypot(steps[:, 0], steps[:, 1]) < STANDING
@@ -153,58 +151,26 @@ def _find_corners(poses: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.flatnonzero(changes) + 1
 
 
-class PoseStock:
-    """Pose messages that are reused: filling one takes a tenth of the time of making one.
-
-    A message with poses of a stock must be sent before the next one is made from the stock.
-    """
-
-    def __init__(self) -> None:
-        self.header = Header()
-        """The header of all poses."""
-        self._poses: list[PoseStamped] = []
-        self._parts: list[tuple[Point, Quaternion]] = []
-
-    def fill(
-        self, positions: Sequence[Sequence[float]], rotations: Sequence[Sequence[float]]
-    ) -> list[PoseStamped]:
-        """Return poses with positions x, y, z [m] and orientations x, y, z, w (quaternions)."""
-        for _ in range(len(positions) - len(self._poses)):
-            self._poses.append(PoseStamped(header=self.header))
-            pose = self._poses[-1].pose
-            self._parts.append((pose.position, pose.orientation))
-        for (point, turn), xyz, xyzw in zip(self._parts, positions, rotations, strict=False):
-            point.x, point.y, point.z = xyz
-            turn.x, turn.y, turn.z, turn.w = xyzw
-        return self._poses[: len(positions)]
-
-    def shrink(self, most: int) -> None:
-        """Drop the poses beyond a number of `most`."""
-        del self._poses[most:], self._parts[most:]
-
-
-def settled_path(
-    prediction: PathPrediction,
-    rows: Sequence[int] | NDArray[np.intp],
-    header: Header,
-    stock: PoseStock | None = None,
-) -> Path:
+def settled_path(prediction: PathPrediction, rows: ArrayLike, header: Header) -> Path:
     """Convert settled waypoints of a prediction into a path with the body's full orientation.
 
     Args:
         prediction: Prediction of n waypoints.
         rows: Indices of the waypoints to write, in order; all must have settled.
         header: Frame and stamp of the path and of every pose.
-        stock: Poses to reuse; None makes new ones.
     """
-    stock = stock or PoseStock()
-    stock.header.frame_id, stock.header.stamp = header.frame_id, header.stamp
     rows = np.asarray(rows, dtype=np.intp)
-    positions = prediction.position[rows].tolist()
     rotations = xyzw_from_rpy(
         prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]
-    ).tolist()
-    return Path(header=stock.header, poses=stock.fill(positions, rotations))
+    )
+    path = Path(header=header)
+    for xyz, xyzw in zip(prediction.position[rows].tolist(), rotations.tolist(), strict=True):
+        stamped = PoseStamped(header=header)
+        place, turn = stamped.pose.position, stamped.pose.orientation
+        place.x, place.y, place.z = xyz
+        turn.x, turn.y, turn.z, turn.w = xyzw
+        path.poses.append(stamped)
+    return path
 
 
 def stamped_pose(pose: ArrayLike, frame_id: str) -> PoseStamped:

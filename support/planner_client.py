@@ -20,7 +20,7 @@ from msg_adapters.identity import path_hash
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes import traverse_server
-from rover_planner.nodes.result_topics import RESULT_KINDS
+from rover_planner.nodes.result_topics import RESULTS
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, result_qos, topic_qos
 from rover_planner.shell import kernels
@@ -55,10 +55,10 @@ class PlannerClient(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("test_planner", context=ros.context)
-        self.heard: dict[str, list] = {topic: [] for topic in RESULT_KINDS}
+        self.heard: dict[str, list] = {topic: [] for topic in RESULTS}
         self.logs: list[str] = []
-        self._answers, self._counts = 0, dict.fromkeys(RESULT_KINDS, 0)
-        for topic, kind in RESULT_KINDS.items():
+        self._answers, self._counts = 0, dict.fromkeys(RESULTS, 0)
+        for topic, (kind, _) in RESULTS.items():
             self.create_subscription(
                 kind, f"{SERVER}/{topic}", partial(self._hear, topic), result_qos()
             )

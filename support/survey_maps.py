@@ -64,7 +64,7 @@ def survey_here(
 
 def layers_of(store: SurveyStore) -> dict[str, np.ndarray]:
     """Return all layers of a store."""
-    return {name: store.layer(name)[:] for name in store.layer_names()}
+    return {name: store.layer(name)[:] for name in store.notes.layers}
 
 
 def count_chunks(out: Path) -> int:
@@ -95,7 +95,7 @@ def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
 
 def refuse_one(job: SurveyJob, chunk: Index) -> ChunkReport:
     """Report of any chunk what a task reports on a full disk."""
-    return ChunkReport(chunk, refusal="No room")
+    return ChunkReport(refusal="No room")
 
 
 def die_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:

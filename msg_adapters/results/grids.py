@@ -10,15 +10,15 @@ from rover_physics.terrain.grid import Terrain
 
 REACHED, NOT_REACHED = 0, 100
 """Values of places inside and outside of an area."""
-VALUES = (0, 33, 66, 100)
-"""Values of the classes 0 to 3: passable, with speed servos, with traction control, impassable."""
 UNKNOWN = -1
-"""Value of cells whose class, a negative number, is unknown, and of unknown ground."""
-_TABLE = np.array([*VALUES, UNKNOWN], np.int8)
+"""Value of unknown ground."""
+VALUES = np.array([0, 33, 66, 100, UNKNOWN], np.int8)
+"""Values of the classes 0 to 3: passable, with speed servos, with traction control, impassable;
+and, as the last one, of the class -1: unknown."""
 
 
 def occupancy_grid(
-    values: NDArray[np.int8], cell: float, first: tuple[float, float], header: Header
+    values: NDArray[np.integer], cell: float, first: tuple[float, float], header: Header
 ) -> OccupancyGrid:
     """Return values (rows, columns), row 0 at the smallest y, as an occupancy grid.
 
@@ -39,29 +39,7 @@ def occupancy_grid(
     return message
 
 
-def area_to_grid(
-    places: NDArray[np.bool_], cell: float, first: tuple[float, float], header: Header
-) -> OccupancyGrid:
-    """Return an area as a grid: REACHED where `places` (rows, columns) is True, else NOT_REACHED.
-
-    The rest is as for `occupancy_grid`; a cell is a place.
-    """
-    values = np.where(places, REACHED, NOT_REACHED).astype(np.int8)
-    return occupancy_grid(values, cell, first, header)
-
-
-def classes_to_grid(
-    classes: NDArray[np.int8], cell: float, first: tuple[float, float], header: Header
-) -> OccupancyGrid:
-    """Return traversability classes (ny, nx), -1 where unknown, as a grid of VALUES and UNKNOWN.
-
-    The rest is as for `occupancy_grid`.
-    """
-    values = _TABLE[classes]  # -1 is the last of the table
-    return occupancy_grid(values, cell, first, header)
-
-
 def terrain_to_occupancy_grid(terrain: Terrain, header: Header) -> OccupancyGrid:
     """Convert a terrain into a grid of known (0) and unknown (-1) cells."""
-    values = np.where(np.isnan(terrain.elevation), UNKNOWN, 0).astype(np.int8)
+    values = np.where(np.isnan(terrain.elevation), UNKNOWN, 0)
     return occupancy_grid(values, terrain.resolution, terrain.origin, header)

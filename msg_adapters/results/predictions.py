@@ -64,7 +64,6 @@ def joint_trajectory(
     prediction: PathPrediction | None,
     rover: Rover,
     header: Header,
-    stock: list[JointTrajectoryPoint] | None = None,
     names: JointNames = OWN_NAMES,
 ) -> JointTrajectory:
     """Return the joints along a path, up to the first waypoint that did not settle.
@@ -79,8 +78,6 @@ def joint_trajectory(
         prediction: Prediction of n waypoints; None makes a trajectory without points.
         rover: The rover.
         header: Frame of the map, and stamp.
-        stock: Points to reuse, because making them takes most of the time. The list grows as
-            needed. One message must be sent before the next one is made from it.
         names: Names, signs and offsets of the joints in messages.
     """
     joints = [*JOINTS, *steering_joints(rover)]
@@ -103,14 +100,12 @@ def joint_trajectory(
     signs = names.signs(joints)
     positions, velocities = signs * (positions - names.offsets(joints)), signs * velocities
     efforts = signs * efforts
-    stock = [] if stock is None else stock
-    stock.extend(JointTrajectoryPoint() for _ in range(count - len(stock)))
-    trajectory.points = stock[:count]
     rows = zip(_rows(positions), _rows(velocities), _rows(efforts), strict=True)
-    for point, row, time in zip(trajectory.points, rows, times.tolist(), strict=True):
-        point.positions, point.velocities, point.effort = row
+    for (angles, rates, torques), time in zip(rows, times.tolist(), strict=True):
+        point = JointTrajectoryPoint(positions=angles, velocities=rates, effort=torques)
         start = point.time_from_start
         start.sec, start.nanosec = divmod(round(time * 1e9), 1_000_000_000)
+        trajectory.points.append(point)
     return trajectory
 
 

@@ -129,16 +129,11 @@ class JudgedCase:
         return self._uses.max(axis=1)
 
     @property
-    def largest_use(self) -> tuple[float, float]:
-        """Largest use of a limit on the path, and the distance [m] where it is."""
-        place = int(self.use.argmax())
-        return float(self.use[place]), float(self.distance[place])
-
-    @property
-    def nearest_limit(self) -> str:
-        """Name of the limit that is used most, such as "tip over"."""
-        place = int(self.use.argmax())
-        return self._limits.rows[int(self._uses[place].argmax())].code.replace("_", " ")
+    def largest_use(self) -> tuple[float, float, str]:
+        """Largest use of a limit on the path, the distance [m] where it is, and of which limit."""
+        place, limit = divmod(int(self._uses.argmax()), len(self._limits))
+        name = self._limits.rows[limit].code.replace("_", " ")
+        return float(self.use[place]), float(self.distance[place]), name
 
     @property
     def _limits(self) -> RoverLimits:

@@ -91,11 +91,9 @@ class Remedy:
                 one.lever.words(self.refusal, one.value, one.now) for one in self.levers
             )
         )
-        use, distance = self.judged.largest_use
-        return (
-            f"{todo}{self._describe_loads()}; largest use {use:.2f} at {distance:.1f} m "
-            f"({self.judged.nearest_limit})"
-        )
+        use, distance, limit = self.judged.largest_use
+        loads = self._describe_loads()
+        return f"{todo}{loads}; largest use {use:.2f} at {distance:.1f} m ({limit})"
 
     def _describe_loads(self) -> str:
         """Return how the load of the axle changes most where the refused path fails."""

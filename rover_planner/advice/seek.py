@@ -9,7 +9,6 @@ by bisection. Poses that an earlier trial failed at come first: who fails there 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any
 
 import numpy as np
 
@@ -38,35 +37,8 @@ class FailedPlace:
     """True if it kept the limits, but not in enough samples."""
 
 
-@dataclass(frozen=True)
-class Combination:
-    """A few levers of a refused path, and their ranges."""
-
-    refusal: JudgedCase
-    """The refused path."""
-    levers: tuple[Lever, ...]
-    """The levers."""
-    ranges: tuple[Span | Choice, ...]
-    """What each may be set to."""
-
-    @property
-    def keeps_rows(self) -> bool:
-        """True if all levers keep the rows of the path."""
-        return all(lever.keeps_rows for lever in self.levers)
-
-    def values(self, shares: Sequence[float]) -> tuple[Any, ...]:
-        """Return the values of the levers at shares of their ranges."""
-        return tuple(one.value_at(share) for one, share in zip(self.ranges, shares, strict=True))
-
-    def set_levers(self, shares: Sequence[float]) -> Case | None:
-        """Return the case with the levers set, None where there is no room for it."""
-        case: Case | None = self.refusal.case
-        try:
-            for lever, value in zip(self.levers, self.values(shares), strict=True):
-                case = None if case is None else lever.apply(case, self.refusal, value)
-        except RoverError:
-            return None
-        return case
+Asked = tuple[tuple[Lever, Span | Choice], ...]
+"""A few levers, and what each may be set to."""
 
 
 def seek_remedies(refusal: JudgedCase) -> Iterator[tuple[tuple[Lever, ...], Remedy | None]]:
@@ -79,13 +51,13 @@ def seek_remedies(refusal: JudgedCase) -> Iterator[tuple[tuple[Lever, ...], Reme
     own = [lever for lever in LEVERS if not lever.needs_others]
     for count, steps in ROUNDS:
         for levers in combinations(LEVERS if steps is COARSE else own, count):
-            settings = [lever.settings(refusal) for lever in levers]
-            ranges = tuple(one for one in settings if one is not None)
-            if not can_combine(levers) or len(ranges) < count:
+            ranges = [(lever, lever.settings(refusal)) for lever in levers]
+            asked = tuple((lever, one) for lever, one in ranges if one is not None)
+            if not can_combine(levers) or len(asked) < count:
                 continue
-            if steps is FINE and isinstance(ranges[0], Choice):
+            if steps is FINE and isinstance(asked[0][1], Choice):
                 continue
-            remedy = seeker.seek(Combination(refusal, levers, ranges), steps)
+            remedy = seeker.seek(asked, steps)
             yield levers, remedy
             helped = helped or (remedy is not None and not remedy.needs_others)
         if helped:
@@ -111,28 +83,30 @@ class _Seeker:
         """Places where cases failed, the last first."""
         self._note(refusal)
 
-    def seek(self, asked: Combination, steps: Sequence[float]) -> Remedy | None:
+    def seek(self, asked: Asked, steps: Sequence[float]) -> Remedy | None:
         """Return the remedy of levers in steps [share of the range], None if there is none."""
-        shares = [one.shares(steps) for one in asked.ranges]
+        shares = [one.shares(steps) for _, one in asked]
         # The nearest come first.
         for chosen in sorted(product(*shares), key=lambda some: sum(map(abs, some))):
             judged = self._judge(asked, chosen)
             if judged is not None:
-                step = steps[0] if len(asked.levers) == 1 else 1.0
+                step = steps[0] if len(asked) == 1 else 1.0
                 least, judged = self._shrink(asked, list(chosen), judged, step)
-                told = zip(asked.levers, asked.values(least), asked.ranges, strict=True)
-                set_levers = tuple(SetLever(lever, value, one.now) for lever, value, one in told)
+                set_levers = tuple(
+                    SetLever(lever, one.value_at(share), one.now)
+                    for (lever, one), share in zip(asked, least, strict=True)
+                )
                 return Remedy(self._refusal, set_levers, judged)
         return None
 
     def _shrink(
-        self, asked: Combination, shares: list[float], judged: JudgedCase, step: float
+        self, asked: Asked, shares: list[float], judged: JudgedCase, step: float
     ) -> tuple[list[float], JudgedCase]:
         """Return the least shares of the ranges that pass, one lever after the other, as judged.
 
         The given ones pass; less by `step` may fail.
         """
-        for k, one in enumerate(asked.ranges):
+        for k, (_, one) in enumerate(asked):
             if isinstance(one, Choice):
                 continue
             passes = shares[k]
@@ -147,16 +121,22 @@ class _Seeker:
             shares[k] = passes
         return shares, judged
 
-    def _judge(self, asked: Combination, shares: Sequence[float]) -> JudgedCase | None:
+    def _judge(self, asked: Asked, shares: Sequence[float]) -> JudgedCase | None:
         """Return the case with levers set if it passes, else None."""
-        case = asked.set_levers(shares)
+        keeps_rows = all(lever.keeps_rows for lever, _ in asked)
+        case = self._refusal.case
         try:
-            if case is None or (asked.keeps_rows and self._fails_where_known(case)):
+            for (lever, one), share in zip(asked, shares, strict=True):
+                changed = lever.apply(case, self._refusal, one.value_at(share))
+                if changed is None:
+                    return None
+                case = changed
+            if keeps_rows and self._fails_where_known(case):
                 return None
             judged = case.judge()
         except RoverError:
             return None  # the rover cannot do that
-        if not judged.passes and asked.keeps_rows:
+        if not judged.passes and keeps_rows:
             self._note(judged)
         return judged if judged.passes else None
 

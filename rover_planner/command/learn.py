@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner learn`: learns the ground from a recorded drive."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -48,12 +49,14 @@ def learn(
     """
     import numpy as np
 
+    from rover_physics.files.user_file import write_file
+    from rover_physics.files.validation import errors_of
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.errors import PlanningError
     from rover_planner.learning.drive_log import X, Y
     from rover_planner.learning.ground_learner import GroundLearner
-    from rover_planner.learning.learned_file import describe, write_learned
+    from rover_planner.learning.learned_file import describe
     from rover_planner.shell.progress import show_bar
 
     model, map_ = load_rover(rover), load_terrain(terrain, max_cells)
@@ -79,19 +82,20 @@ def learn(
             f"{log}: nothing can be learned: the drive is not on the known part of the map, "
             "or too short"
         )
-    write_learned(out, describe(learner.estimate, told))
-    layers = learner.layers
+    with errors_of(out, PlanningError):
+        contents = json.dumps(describe(learner.estimate, told), indent=1)
+        write_file(out, f"{contents}\n".encode())
+    mean, std = learner.layers
     if ground is not None:
         from rover_physics.terrain.grid import save_terrain
 
-        known = layers.friction if map_.friction is None else map_.friction
-        friction_layer = np.where(np.isfinite(layers.friction), layers.friction, known)
-        learned_map = replace(map_, friction=friction_layer)
-        save_terrain(ground, learned_map, friction_std=layers.friction_std)
+        known = mean if map_.friction is None else map_.friction
+        learned_map = replace(map_, friction=np.where(np.isfinite(mean), mean, known))
+        save_terrain(ground, learned_map, friction_std=std)
     if picture is not None:
         from rover_planner.figures.learning_picture import draw_learning
 
-        draw_learning(picture, map_, np.array(places), estimates, layers.friction)
+        draw_learning(picture, map_, np.array(places), estimates, mean)
     found = learner.estimate.friction
     high = "not bounded above" if found.high is None else f"at most {found.high:.2f}"
     if learner.estimate.soil is not None:

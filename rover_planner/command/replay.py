@@ -49,7 +49,7 @@ def replay(
     need("rclpy", "replay")
     need("rosbags", "replay")
     from rover_planner.ros.bags import bag_files
-    from rover_planner.ros.bags.replay import Questions, Replay
+    from rover_planner.ros.bags.replay import Replay
     from rover_planner.shell.progress import show_bar
 
     if start is not None and goal is None:
@@ -57,8 +57,7 @@ def replay(
     if out.exists():
         raise PlanningError(f"{out} exists already; OUT must be a new folder")
     given = {"rover": rover, "map_frame": map_frame, "map_resolution": resolution}
-    questions = Questions(goal, start, stretch)
-    work = Replay(_read_parameters(parameters, given), questions)
+    work = Replay(_read_parameters(parameters, given), goal, start, stretch)
     topics = {
         bag_files.MAP: map_topic,
         bag_files.JOINTS: joints_topic,
@@ -105,11 +104,8 @@ class _Results:
     """Writes answers to a folder: messages, predictions and maps."""
 
     def __init__(self, folder: Path, work: "Replay", bag: "BagWriter"):
-        from rover_physics.rover.rover_file import load_rover
-
-        self._folder, self._work, self._bag = folder, work, bag
-        self._parameters = work.parameters
-        self._rover = load_rover(work.parameters.rover)
+        self._folder, self._inputs, self._bag = folder, work.inputs, bag
+        self._settings = work.inputs.service.settings
         self._maps: dict[str, str] = {}
         self.count = 0
         """Number of answers."""
@@ -148,19 +144,17 @@ class _Results:
         """Write prediction and measurements of an answer; return their entries of the report."""
         from rover_physics.files.npz_file import write_npz
         from rover_planner.command.prediction_files import write_prediction
-        from rover_planner.planning.answering.service_settings import load_service_settings
         from rover_planner.planning.assumptions import assume
 
         candidate = answer.judgement.candidate
         if candidate is None or answer.terrain is None:
             return {}
-        file = f"{name}.npz"
-        query = load_service_settings(self._parameters).query
+        file, query = f"{name}.npz", self._settings.query
         write_prediction(
             self._folder / file,
             candidate.prediction,
             candidate.verdict,
-            assumptions=assume(self._rover, query.model, query.map_sigmas),
+            assumptions=assume(self._settings.rover, query.model, query.map_sigmas),
         )
         entries: dict[str, Any] = {
             "prediction": file,
@@ -178,18 +172,18 @@ class _Results:
         from std_msgs.msg import Header
 
         from msg_adapters.stamps import ns_to_stamp
-        from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
+        from rover_planner.nodes.result_topics import RESULTS, ResultMessages
 
         messages = ResultMessages(
             answer.judgement,
             answer.identity,
-            Header(frame_id=self._parameters.map_frame, stamp=ns_to_stamp(answer.stamp)),
-            self._rover,
-            self._parameters,
-            self._work.inputs,
+            Header(frame_id=self._settings.parameters.map_frame, stamp=ns_to_stamp(answer.stamp)),
+            self._settings.rover,
+            self._settings.parameters,
+            self._inputs,
         )
-        for topic in RESULT_KINDS:
-            self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
+        for topic, (_, make) in RESULTS.items():
+            self._bag.write(f"/traverse_server/{topic}", make(messages), answer.stamp)
 
 
 def _read_parameters(path: Path | None, given: dict[str, Any]) -> "TraverseServerParameters":

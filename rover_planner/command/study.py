@@ -21,6 +21,7 @@ def study(
     Exit code 0: it ran. 2: bad input.
     """
     need("matplotlib", "the picture of a study")
+    from rover_planner.figures.study_plot import draw_study
     from rover_planner.shell.progress import show_bar
     from rover_planner.studies.rover_values import write_rover
     from rover_planner.studies.runner import (
@@ -31,7 +32,6 @@ def study(
         run_study,
     )
     from rover_planner.studies.study_file import find_examples, load_study
-    from rover_planner.studies.study_plot import draw_study
 
     task = load_study(find_examples().get(str(file), file))
     typer.echo("\n".join(describe_question(task)))
@@ -40,7 +40,7 @@ def study(
     try:
         output.mkdir(parents=True, exist_ok=True)
         result.write_csv(output / f"{file.stem}.csv")
-        best = write_rover(find_rover(task, result.best))
+        best = write_rover(find_rover(task, result.best.values))
         (output / f"{file.stem}_best.yaml").write_text(best, encoding="utf-8")
     except OSError as error:
         raise PlanningError(f"cannot write into {show_file(output)}: {error.strerror}") from None

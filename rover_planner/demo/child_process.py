@@ -16,7 +16,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
+
+from rover_planner.shell.run_program import END_SIGNALS, end_as_by_ctrl_c
 
 GRACE = 4.0
 """Time that a process has to end after SIGTERM before it is killed [s]."""
@@ -110,27 +111,20 @@ class ChildProcess:
 def stopping_children() -> Iterator[list[ChildProcess]]:
     """Yield a list for child processes; all of them are stopped when the block ends.
 
-    SIGTERM and SIGHUP end the block as Ctrl-C does, with the exit code that shells expect. Further
-    signals are blocked while the children are being stopped.
+    SIGTERM and SIGHUP end the block as Ctrl-C does. Further signals are blocked while the children
+    are being stopped.
     """
     children: list[ChildProcess] = []
-    numbers = (signal.SIGTERM, signal.SIGHUP)
-    previous = {number: signal.signal(number, _exit_by_signal) for number in numbers}
-    previous[signal.SIGINT] = signal.getsignal(signal.SIGINT)
-    try:
-        yield children
-    finally:
-        for number in previous:
-            signal.signal(number, signal.SIG_IGN)
-        for child in reversed(children):
-            child.stop()
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-
-
-def _exit_by_signal(number: int, frame: FrameType | None) -> None:
-    """Raise SystemExit, so that all finally blocks run."""
-    raise SystemExit(128 + number)
+    with end_as_by_ctrl_c():
+        try:
+            yield children
+        finally:
+            numbers = (signal.SIGINT, *END_SIGNALS)
+            previous = {number: signal.signal(number, signal.SIG_IGN) for number in numbers}
+            for child in reversed(children):
+                child.stop()
+            for number, handler in previous.items():
+                signal.signal(number, handler)
 
 
 def _run_module() -> None:

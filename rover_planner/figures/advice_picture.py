@@ -5,11 +5,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patheffects import withStroke
 
 from rover_planner.advice.advise import Advice
 from rover_planner.advice.case import JudgedCase
-from rover_planner.figures.pictures import REFUSED, draw_terrain, drawing
+from rover_planner.figures.pictures import REFUSED, draw_terrain, drawing, outlined
 
 COLOURS = ("#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of the remedies."""
@@ -58,7 +57,6 @@ def draw_advice(path: Path, advice: Advice, map_name: str) -> None:
 def _draw_case(axes: Axes, below: Axes, judged: JudgedCase, colour: str, label: str) -> None:
     """Draw a path on the ground, and the largest use along it below."""
     x, y, _ = judged.case.poses.T
-    halo = [withStroke(linewidth=4.0, foreground="white")]
-    axes.plot(x, y, color=colour, linewidth=1.8, path_effects=halo)
+    axes.plot(x, y, color=colour, linewidth=1.8, **outlined(4.0))
     use = np.fmin(judged.use, MOST_USE)
     below.plot(judged.distance[: len(use)], use, color=colour, linewidth=1.2, label=label)

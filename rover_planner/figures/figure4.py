@@ -15,12 +15,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_poses
 from rover_planner.figures.pictures import drawing
+from rover_planner.studies.objectives import level_loads
 
-AXLES = ("rear", "middle", "front")
 MAX_TORQUE = 0.2
 """Torques vary between minus and plus MAX_TORQUE [N m], as in the paper."""
 ALONE, HELD = "other motors off, thrust held at the body", "thrust held by all wheels alike"
@@ -33,11 +32,7 @@ _HEADROOM = 1.55
 
 def loads_at_rest(rover: Rover) -> np.ndarray:
     """Return the loads (3,) [N] of rear, middle and front wheel of one side on level ground."""
-    cell = 0.5 * rover.wheel.radius
-    half = 3.0 * max(abs(place[0]) for place in rover.suspension.wheels.values())
-    count = 2 * int(np.ceil(half / cell)) + 1
-    level = Terrain(np.zeros((count, count)), cell, (-0.5 * (count - 1) * cell,) * 2)
-    loads = judge_poses(rover, level, np.zeros((1, 3)))[0].wheel_loads[0]
+    loads = level_loads(rover)
     return 0.5 * (loads[:3] + loads[3:])
 
 
@@ -53,8 +48,8 @@ def load_changes(rover: Rover, tractions: np.ndarray) -> np.ndarray:
         tractions: (3,) tractions of the wheels of one side, positive forward [N].
     """
     suspension = rover.suspension
-    wheels = np.array([suspension.wheels[name] for name in AXLES])
-    on_bogie = np.array([name != suspension.rocker_wheel for name in AXLES])
+    wheels = np.array([suspension.wheels[name] for name in WHEEL_POSITIONS])
+    on_bogie = np.array([name != suspension.rocker_wheel for name in WHEEL_POSITIONS])
     ground = wheels[:, 2] - rover.wheel.radius
     rocker, bogie = np.array(suspension.rocker_pivot), np.array(suspension.bogie_pivot)
     about_rocker = np.sum((ground - rocker[2]) * tractions)
@@ -70,7 +65,7 @@ def loads_under_torque(rover: Rover, axle: int, torque: float, case: str) -> np.
 
     Args:
         rover: The rover.
-        axle: Index into AXLES.
+        axle: Index into WHEEL_POSITIONS.
         torque: Torque on each of the two wheels, positive forward [N m].
         case: ALONE or HELD.
     """
@@ -99,8 +94,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
     }
     centre = loads_at_rest(rover)
     largest = 1.15 * max(np.abs(values - centre).max() for values in loads.values())
-    bold = {"axes.titlesize": 11, "axes.titleweight": "bold"}
-    with drawing(path, (10.5, 9.0), bold) as figure:
+    with drawing(path, (10.5, 9.0)) as figure:
         panels = figure.subplots(3, 3, sharex=True, sharey="col")
         for row in range(3):
             for column in range(3):
@@ -111,10 +105,11 @@ def draw_figure4(path: Path, rover: Rover) -> None:
                     centre[column], color="#999999", linewidth=0.8, zorder=1.9, label="no torque"
                 )
                 axes.set_ylim(centre[column] - largest, centre[column] + _HEADROOM * largest)
-                axes.set_xlabel(f"{AXLES[row]} wheel torque [mN·m]")
-                axes.set_ylabel(f"{AXLES[column]} load [N]")
+                axes.set_xlabel(f"{WHEEL_POSITIONS[row]} wheel torque [mN·m]")
+                axes.set_ylabel(f"{WHEEL_POSITIONS[column]} load [N]")
         for column in range(3):
-            panels[0, column].set_title(f"{AXLES[column].capitalize()} normal force")
+            title = f"{WHEEL_POSITIONS[column].capitalize()} normal force"
+            panels[0, column].set_title(title, fontsize=11, fontweight="bold")
         panels[0, 0].set_xticks([-200, -100, 0, 100, 200])
         figure.suptitle(
             f"Over-actuation of {rover.name} on level ground: wheel loads against one torque",

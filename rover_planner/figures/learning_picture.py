@@ -9,13 +9,7 @@ from matplotlib.axes import Axes
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
-from rover_planner.figures.pictures import (
-    INK,
-    PASSABLE,
-    REFUSED,
-    draw_terrain,
-    drawing,
-)
+from rover_planner.figures.pictures import INK, PASSABLE, REFUSED, draw_terrain, drawing
 from rover_planner.learning.ground_learner import GroundEstimate
 
 MOST = 1.5

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
-from matplotlib.patheffects import withStroke
 
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
@@ -17,6 +16,7 @@ from rover_planner.figures.pictures import (
     draw_terrain,
     drawing,
     find_extent,
+    outlined,
 )
 from rover_planner.planning.asked_poses import merge_poses
 from rover_planner.planning.path_query import Candidate
@@ -53,8 +53,7 @@ def draw_path(path: Path, question: SearchQuery, answer: SearchResult, map_name:
             _draw_area(axes, answer)
         if answer.path is not None:
             x, y, _ = answer.path.poses.T
-            halo = [withStroke(linewidth=4.5, foreground="white")]
-            axes.plot(x, y, color=PASSABLE, linewidth=2.2, path_effects=halo, label="path")
+            axes.plot(x, y, color=PASSABLE, linewidth=2.2, label="path", **outlined(4.5))
         _draw_end(axes, "start", np.asarray(question.start), INK)
         _draw_end(axes, "goal", np.asarray(question.goal), REFUSED)
         title = f"{question.rover.name} on {map_name}: {_title(answer)}"

@@ -2,7 +2,7 @@
 """The common parts of all pictures: style, writing to a file, and the shaded ground of a map."""
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from rover_physics.files.user_file import write_file
@@ -66,27 +67,29 @@ def check_picture(path: Path) -> None:
 
 
 @contextmanager
-def drawing(
-    path: Path, size: tuple[float, float], style: Mapping[str, Any] | None = None
-) -> Iterator[Figure]:
+def drawing(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
     """Yield a figure to draw in; write it to a file at the end.
 
     Args:
         path: Picture to write; its suffix sets the format, such as .png.
         size: Width and height [inch].
-        style: Settings of matplotlib that differ from STYLE.
 
     Raises:
         PlanningError: The suffix names no format, or the file cannot be written.
     """
     check_picture(path)
-    with matplotlib.rc_context(STYLE | dict(style or {})):
+    with matplotlib.rc_context(STYLE):
         figure, picture = Figure(figsize=size, layout="constrained"), io.BytesIO()
         FigureCanvasAgg(figure)
         yield figure
         figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
     with errors_of(path, PlanningError):
         write_file(path, picture.getvalue())
+
+
+def outlined(width: float, colour: str = "white") -> dict[str, Any]:
+    """Return the style of a line with another colour around it, up to a width [pt]."""
+    return {"path_effects": [withStroke(linewidth=width, foreground=colour)]}
 
 
 def find_extent(origin: tuple[float, float], shape: tuple[int, ...], resolution: float) -> Extent:

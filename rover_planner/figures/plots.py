@@ -10,13 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.errors import PlanningError
 from rover_planner.figures.pictures import (
     INK,
     PASSABLE,
@@ -25,6 +23,7 @@ from rover_planner.figures.pictures import (
     WHEEL_COLOURS,
     drawing,
     find_extent,
+    outlined,
 )
 from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
 from rover_planner.planning.goals import Goal
@@ -61,10 +60,8 @@ def draw_answers(
         title: Heading of the picture.
 
     Raises:
-        PlanningError: No answers, or the file cannot be written.
+        PlanningError: The file cannot be written.
     """
-    if not answers:
-        raise PlanningError("no answers to draw; there must be at least one")
     shown = list(answers)[:_COLUMNS]
     with drawing(path, (max(12.5, 2.6 * len(shown)), 15.5)) as figure:
         grid = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.05))
@@ -112,11 +109,6 @@ def _start_style(yaw: float, size: float) -> dict[str, Any]:
     return {"marker": _arrow(yaw), "ls": "", "markersize": size, **edge}
 
 
-def _around(colour: str, width: float) -> dict[str, Any]:
-    """Return the style of a line with another colour around it."""
-    return {"path_effects": [withStroke(linewidth=width, foreground=colour)]}
-
-
 def _key(label: str, **style: Any) -> Line2D:
     """Return an entry of a legend."""
     return Line2D([], [], label=label, **style)
@@ -125,7 +117,7 @@ def _key(label: str, **style: Any) -> Line2D:
 def _map_legend(terrain: Terrain) -> list[Line2D]:
     """Return the handles of the map's legend."""
     handles = [
-        _key("chosen path", color=CHOSEN, lw=3, **_around(INK, 5)),
+        _key("chosen path", color=CHOSEN, lw=3, **outlined(5, INK)),
         _key("traversable candidate", color=PASSABLE, lw=1.6),
         _key("refused candidate", color=REFUSED, lw=1.6),
         _key("where it fails first", color=REFUSED, marker="x", ls="", mew=2),
@@ -162,10 +154,10 @@ def _draw_candidates(axes: Axes, answer: PathAnswer) -> None:
     if refused:
         spots = np.array([one.poses[one.verdict.first_failure, :2] for one in refused])
         cross: dict[str, Any] = {"color": REFUSED, "mew": 2, "ms": 6, "zorder": 6}
-        axes.plot(*spots.T, "x", **cross, **_around("white", 3.5))
+        axes.plot(*spots.T, "x", **cross, **outlined(3.5))
     if answer.traversable:
         thick: dict[str, Any] = {"color": CHOSEN, "lw": 2.4, "zorder": 5}
-        axes.plot(*answer.chosen.poses[:, :2].T, **thick, **_around(INK, 4.6))
+        axes.plot(*answer.chosen.poses[:, :2].T, **thick, **outlined(4.6, INK))
 
 
 def _draw_goal(axes: Axes, name: str, answer: PathAnswer) -> None:

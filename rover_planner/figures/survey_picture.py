@@ -31,7 +31,6 @@ from rover_planner.survey.layers import (
 from rover_planner.survey.reachable import ReachableArea
 from rover_planner.survey.store import SurveyStore
 
-_MAX_CELLS = 1200
 _STRENGTH = 0.55
 
 
@@ -45,7 +44,7 @@ def draw_survey(path: Path, store: SurveyStore) -> None:
     Raises:
         PlanningError: The file cannot be written, or the map cannot be read any more.
     """
-    classes = read_drawn_classes(store, _thinning(store))
+    classes = read_drawn_classes(store)
     shown = np.where(classes == NOT_SURVEYED, np.nan, classes)
     labels = [*zip(CLASS_LABELS, CLASS_COLOURS, strict=True), (UNKNOWN_LABEL, UNKNOWN)]
     rover = store.notes.description["rover"]["name"]
@@ -65,7 +64,7 @@ def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
     Raises:
         PlanningError: As `draw_survey`.
     """
-    every = _thinning(store)
+    every = count_skipped(store.notes.layout.shape)
     distance = area.distance[::every, ::every]
     shown = np.where(np.isfinite(distance), distance, np.nan)
     longest = area.longest or 0.0
@@ -96,9 +95,9 @@ def _draw(path, store, shown, scale, labels, title, start=None) -> None:
     notes = store.notes
     frame, (rows, columns) = notes.frame, notes.layout.map_shape
     extent = find_extent(frame.origin, (rows, columns), frame.resolution)
-    every = max(1, -(-max(rows, columns) // _MAX_CELLS))
+    every = count_skipped((rows, columns))
     heights = store.open_map().read((slice(0, rows), slice(0, columns)), every)["elevation"]
-    cell = notes.cell * _thinning(store)
+    cell = notes.cell * count_skipped(notes.layout.shape)
     with drawing(path, (8.5, 7.5)) as figure:
         axes = figure.subplots()
         draw_ground(axes, heights, frame.resolution * every, extent)
@@ -141,8 +140,3 @@ def choose_bar(width: float) -> float:
     most = 0.25 * width * (1.0 + 1e-9)
     power = 10.0 ** math.floor(math.log10(most))
     return power * max(k for k in (1, 2, 5) if k * power <= most)
-
-
-def _thinning(store: SurveyStore) -> int:
-    """Return every how many cells are drawn."""
-    return count_skipped(store, _MAX_CELLS)

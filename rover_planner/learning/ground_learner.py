@@ -23,7 +23,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.learning.contact_sense import ContactSense
 from rover_planner.learning.drive_log import PITCH, RATES, SUSPENSION, TIME, TORQUES, WIDTH, X, Y
 from rover_planner.learning.friction_filter import FrictionEstimate, FrictionFilter
-from rover_planner.learning.ground_map import GroundLayers, GroundMap
+from rover_planner.learning.ground_map import GroundMap
 from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from rover_planner.learning.stuck_watch import StuckWatch
 from rover_planner.learning.wheel_health import RATE, WheelHealth
@@ -124,16 +124,6 @@ class GroundEstimate:
     """Sensors that are not believed, by wheel, and why."""
     soil: SoilEstimate | None
     """The soil, on ground that yields."""
-
-
-@dataclass(frozen=True, eq=False)
-class TorqueNoise:
-    """How unsteady the torques of a window are."""
-
-    fluctuation: Floats
-    """(6,) standard deviations over the means."""
-    error: Floats
-    """(6,) standard errors of the mean tractions [N]."""
 
 
 _SUMS = record_type(
@@ -279,8 +269,11 @@ class GroundLearner:
         return True
 
     @property
-    def layers(self) -> GroundLayers:
-        """Friction on the map: where wheels have been, and by class elsewhere."""
+    def layers(self) -> Floats:
+        """(2, ny, nx) mean and standard deviation of the friction on the map, NaN if not known.
+
+        They are what was felt where wheels have been, and those of its class elsewhere.
+        """
         return self.ground.spread(self._class_estimates)
 
     @property
@@ -324,14 +317,7 @@ class GroundLearner:
             *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
             *((self._classes[number], wheels) for number, wheels in on_class.items()),
         ]
-        squares = np.array([squares for _, squares, _ in self._recent]).mean(axis=0)
-        count = np.array([count for _, _, count in self._recent]).sum(axis=0)
-        spread = np.sqrt(np.maximum(squares - torques**2, 0.0))
-        felt = TorqueNoise(
-            fluctuation=spread / np.maximum(np.abs(torques), 1e-9),
-            error=spread / np.sqrt(count) / self._rover.wheel.radius,
-        )
-        self._learn_friction(window, slips, grips & good, felt, grounds, elapsed)
+        self._learn_friction(window, slips, grips & good, torques, grounds, elapsed)
 
     def _turns_freely(self, window: SlipWindow) -> Flags:
         """Return (6,) whether motors are slow enough to give the torque they are asked for."""
@@ -351,17 +337,18 @@ class GroundLearner:
         window: SlipWindow,
         slips: Flags,
         grips: Flags,
-        felt: TorqueNoise,
+        torques: Floats,
         grounds: Sequence[tuple[FrictionFilter, Flags]],
         elapsed: float,
     ) -> None:
         """Take what the wheels of a window tell about the friction of the grounds below them."""
+        fluctuation, error = self._find_torque_noise(torques)
         unit = self._sense.weight / WHEEL_COUNT
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
-        sticking = felt.fluctuation * (1.0 - np.abs(window.ratio))
+        sticking = fluctuation * (1.0 - np.abs(window.ratio))
         tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
         tells &= sticking < MOST_STICKING
         tells &= window.doubts < MOST_DOUBT * loads
@@ -372,9 +359,9 @@ class GroundLearner:
         most = np.maximum(GRIP_SHARE * np.abs(window.rolling), self._least_slip)
         grips = grips & (np.abs(window.slip) < most)
         grips &= beyond < GRIP_EXCESS * self._sense.weight
-        proved = np.maximum(np.abs(tractions) - CERTAIN_GRIP * felt.error, 0.0)
+        proved = np.maximum(np.abs(tractions) - CERTAIN_GRIP * error, 0.0)
         shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
-        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * felt.fluctuation**2)
+        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * fluctuation**2)
         for one, own in grounds:
             if own.any():
                 one.drive(distance)
@@ -386,6 +373,17 @@ class GroundLearner:
             held = np.sort((proved / np.maximum(loads, 1e-9))[counts & grips & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong
                 one.grip(float(held[-2]))
+
+    def _find_torque_noise(self, torques: Floats) -> tuple[Floats, Floats]:
+        """Return the fluctuations (6,) over the mean torques, and the mean tractions' errors [N].
+
+        They are standard deviations of torques, and standard errors of means.
+        """
+        squares = np.array([squares for _, squares, _ in self._recent]).mean(axis=0)
+        count = np.array([count for _, _, count in self._recent]).sum(axis=0)
+        spread = np.sqrt(np.maximum(squares - torques**2, 0.0))
+        fluctuation = spread / np.maximum(np.abs(torques), 1e-9)
+        return fluctuation, spread / np.sqrt(count) / self._rover.wheel.radius
 
     def _weigh(self, window: SlipWindow, tells: Flags, elapsed: float) -> Floats:
         """Return (6,) numbers of independent measurements; at one place they tell less and less.

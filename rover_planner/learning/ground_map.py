@@ -2,7 +2,6 @@
 """Friction of the ground where wheels have been and of its classes, as layers of a map."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +11,6 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.learning.friction_filter import FrictionEstimate
 
 
-@dataclass(frozen=True, eq=False)
-class GroundLayers:
-    """Layers (ny, nx) of a terrain; NaN where nothing was learned."""
-
-    friction: Floats
-    """Mean of the friction."""
-    friction_std: Floats
-    """Standard deviation of it."""
-
-
 class GroundMap:
     """Writes what is learned below the wheels into layers of a terrain."""
 
@@ -29,9 +18,9 @@ class GroundMap:
         """Start with ground that no wheel of a width [m] has touched."""
         self._classes = terrain.ground_class
         self._origin, self._resolution = np.array(terrain.origin), terrain.resolution
-        shape = terrain.elevation.shape
-        self.visited = GroundLayers(np.full(shape, np.nan), np.full(shape, np.nan))
-        """The estimates where wheels have been; the last visit counts."""
+        self.visited = np.full((2, *terrain.elevation.shape), np.nan)
+        """(2, ny, nx) mean and standard deviation of the friction where wheels have been, NaN
+        elsewhere; the last visit counts."""
         reach = max(round(0.5 * width / terrain.resolution), 0)
         steps = np.arange(-reach, reach + 1)
         self._around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -39,10 +28,10 @@ class GroundMap:
     def visit(self, places: Floats, estimate: FrictionEstimate) -> None:
         """Take wheels at places (n, 2) [m] and what they tell."""
         cells = (self._cells_at(places)[:, None, :] + self._around).reshape(-1, 2)
-        rows, columns = self.visited.friction.shape
+        rows, columns = self.visited.shape[1:]
         inside = ((cells >= 0) & (cells < [columns, rows])).all(axis=1)
-        at = cells[inside, 1], cells[inside, 0]
-        self.visited.friction[at], self.visited.friction_std[at] = estimate.mean, estimate.std
+        columns, rows = cells[inside].T
+        self.visited[:, rows, columns] = [[estimate.mean], [estimate.std]]
 
     def classes_at(self, places: Floats) -> Floats:
         """Return the classes (n,) of the ground at places (n, 2) [m] on the map; NaN for none."""
@@ -52,16 +41,16 @@ class GroundMap:
         columns, rows = np.clip(self._cells_at(places), 0, most).T
         return np.asarray(self._classes[rows, columns])
 
-    def spread(self, by_class: Mapping[int, FrictionEstimate]) -> GroundLayers:
-        """Return the estimates where wheels have been, and elsewhere those of its class.
+    def spread(self, by_class: Mapping[int, FrictionEstimate]) -> Floats:
+        """Return `visited` with the estimates of its class on other ground.
 
         A class on which no wheel slipped enough has none.
         """
-        layers = GroundLayers(self.visited.friction.copy(), self.visited.friction_std.copy())
+        layers = self.visited.copy()
         for number, estimate in by_class.items():
             if estimate.high is not None and self._classes is not None:
-                cells = (self._classes == number) & np.isnan(self.visited.friction)
-                layers.friction[cells], layers.friction_std[cells] = estimate.mean, estimate.std
+                cells = (self._classes == number) & np.isnan(self.visited[0])
+                layers[:, cells] = [[estimate.mean], [estimate.std]]
         return layers
 
     def _cells_at(self, places: Floats) -> NDArray[np.intp]:

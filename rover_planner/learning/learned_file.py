@@ -1,16 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The file of what was learned of the ground, as `learn` writes it."""
 
-import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-from rover_physics.files.user_file import write_file
-from rover_physics.files.validation import errors_of
 from rover_physics.names import WHEELS
 from rover_physics.numerics.plain_values import to_plain
-from rover_planner.errors import PlanningError
 from rover_planner.learning.ground_learner import GroundEstimate
 from rover_planner.learning.soil_fit import SoilEstimate
 
@@ -43,16 +38,6 @@ def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
         found["soil"] = _describe_soil(estimate.soil)
     contents: dict[str, Any] = to_plain(found)
     return contents
-
-
-def write_learned(path: Path, contents: dict[str, Any]) -> None:
-    """Write a file of JSON.
-
-    Raises:
-        PlanningError: It cannot be written.
-    """
-    with errors_of(path, PlanningError):
-        write_file(path, (json.dumps(contents, indent=1) + "\n").encode())
 
 
 def _describe_soil(soil: SoilEstimate) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.results.diagnostics import to_json
 from rover_planner.advice.advise import Advice, grow_within, refuse
-from rover_planner.advice.case import Case, case_of
+from rover_planner.advice.case import case_of
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, Budget
@@ -74,8 +74,10 @@ class AdviceTopics:
         """Return advice, and publish it as it grows; called in the thread."""
         if refused is None:
             return refuse("no_path", NOTHING_REFUSED)
-        told = None
-        for advice in grow_within(_case_of(refused), lambda: self._desk.give_way(check)):
+        judge, candidate, told = refused.judge, refused.candidate, None
+        assert judge is not None and candidate is not None
+        case = case_of(judge.rover, judge.terrain, candidate.poses, judge.options)
+        for advice in grow_within(case, lambda: self._desk.give_way(check)):
             if told is None or len(advice.found) > len(told.found):
                 self._node.handover.call(partial(self._publish, advice))
             told = advice
@@ -84,10 +86,3 @@ class AdviceTopics:
 
     def _publish(self, advice: Advice) -> None:
         self._growing.publish(String(data=to_json(advice.to_dict())))
-
-
-def _case_of(judgement: PathJudgement) -> Case:
-    """Return the case of a refused path, on the map and with the settings of its judgement."""
-    judge, candidate = judgement.judge, judgement.candidate
-    assert judge is not None and candidate is not None
-    return case_of(judge.rover, judge.terrain, candidate.poses, judge.options)

@@ -2,13 +2,16 @@
 """The maps of a traverse server: topics, files, what the rover itself knows; and its ~/map."""
 
 import contextlib
+import math
 import time
 from collections.abc import Callable
+from concurrent import futures
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
 import numpy as np
+from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import LoadMap
 from rclpy.exceptions import InvalidHandle
 from sensor_msgs.msg import PointCloud2
@@ -36,6 +39,8 @@ LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""
 FIRST_MAPS = 20
 """Maps that replace each other of which each has a line in the log."""
+WAIT = 0.02
+"""Time between two checks of a question that waits for a map [s]."""
 MERGE_WAIT = 0.005
 """Longest wait of a question for a map that is to be merged into the one that is there [s]. A busy
 machine may take 15 ms more to wake the thread until it is 20 ms."""
@@ -77,15 +82,16 @@ class MapTopics(MapIntake):
 
         subscribe_to_map(self._node, kind, topic, offer)
 
-    def wait(
-        self, ticket: int, check: Callable[[], object], longest: float = float("inf")
-    ) -> None:
-        """Wait until the maps before a ticket are taken; `check` may raise meanwhile.
+    def wait(self, job: Future[None], check: Callable[[], object]) -> None:
+        """Wait until a job is done, such as `last_job`; `check` may raise meanwhile.
 
         Where maps merge, the wait is no longer than MERGE_WAIT, as there is a good map.
         """
         merges = self._inputs.keeper.merges and self._service.known_map is not None
-        super().wait(ticket, check, MERGE_WAIT if merges else longest)
+        end = time.monotonic() + (MERGE_WAIT if merges else math.inf)
+        while not job.done() and (left := end - time.monotonic()) > 0.0:
+            futures.wait([job], min(WAIT, left))
+            check()
 
     def apply(self, values: TraverseServerParameters) -> None:
         """Make the present map anew if a parameter of messages has changed.
@@ -107,7 +113,13 @@ class MapTopics(MapIntake):
 
         def load() -> None:
             try:
-                self._load(request.map_url, response)
+                response.map = self._load(request.map_url)
+                response.result = LoadMap.Response.RESULT_SUCCESS
+            except RoverError as error:
+                self._node.get_logger().error(f"load_map: {error}")
+                response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
+                if isinstance(error, MapFileError):
+                    response.result = LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
             except Exception as error:
                 self._node.guard.report("load_map", error)
                 response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
@@ -115,31 +127,19 @@ class MapTopics(MapIntake):
 
         self.do(load)
 
-    def _load(self, url: str, response: LoadMap.Response) -> None:
-        """Take the map of a file and fill the response."""
-        try:
-            values = self.values
-            limits = MapLimits(values.map_folder, values.max_map_bytes, values.max_map_cells)
-            terrain = open_map(url, limits)
-            standing, now = self._service.standing(), self._node.seconds
-            snapshot = self._inputs.keeper.load(terrain, now, standing)
-        except RoverError as error:
-            self._node.get_logger().error(f"load_map: {error}")
-            missing = isinstance(error, MapFileError)
-            response.result = (
-                LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
-                if missing
-                else LoadMap.Response.RESULT_INVALID_MAP_DATA
-            )
-            return
+    def _load(self, url: str) -> OccupancyGrid:
+        """Take the map of a file; return its known cells."""
+        values = self.values
+        limits = MapLimits(values.map_folder, values.max_map_bytes, values.max_map_cells)
+        terrain = open_map(url, limits)
+        standing, now = self._service.standing(), self._node.seconds
+        snapshot = self._inputs.keeper.load(terrain, now, standing)
         self.forget()
         self._is_from_topic = False
         source = show_file(url)
         self._note(source, self._inputs.keep(snapshot, source))
         stamp = self._node.get_clock().now().to_msg()
-        header = Header(frame_id=self.values.map_frame, stamp=stamp)
-        response.map = terrain_to_occupancy_grid(terrain, header)
-        response.result = LoadMap.Response.RESULT_SUCCESS
+        return terrain_to_occupancy_grid(terrain, Header(frame_id=values.map_frame, stamp=stamp))
 
     def look_under_rover(self) -> None:
         """Have unknown ground under the rover filled, if that is due."""
@@ -198,23 +198,20 @@ class MapCloud:
         """Create the publisher."""
         self._node, self._service = node, service
         self._publisher = LazyPublisher(node, PointCloud2, "~/map")
-        self._shown: KnownMap | None = None
+        self._shown = ""  # fingerprint
         self._pool = ThreadPoolExecutor(1, "map_cloud")
         self._work: Future[None] | None = None
 
     def update(self) -> None:
         """Publish the map if it is new and someone subscribes; call it about once a second."""
         known = self._service.known_map
-        is_new = known is not None and known.fingerprint != getattr(
-            self._shown, "fingerprint", None
-        )
         is_free = self._work is None or self._work.done()
-        if known is None or not is_new or not is_free:
+        if known is None or known.fingerprint == self._shown or not is_free:
             return
         if not self._publisher.has_listeners:
             self._publisher.withdraw()
         else:
-            self._shown = known
+            self._shown = known.fingerprint
             self._work = self._pool.submit(self._publish, known)
 
     def close(self) -> None:

@@ -18,6 +18,7 @@ from rclpy.node import Node
 
 from rover_physics.errors import RoverError
 from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.nodes.result_topics import ResultMessages
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.questions import (
@@ -31,11 +32,6 @@ from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import describe_path
-
-Publish = Callable[[PathJudgement, IdentityReport], Any]
-ReadPath = Callable[[Path], GivenPath]
-ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
-
 
 ERRORS = {
     "": "NONE",
@@ -55,9 +51,9 @@ class Nav2Services:
         self,
         node: Node,
         desk: QuestionDesk,
-        read_path: ReadPath,
-        read_question: ReadQuestion,
-        publish: Publish,
+        read_path: Callable[[Path], GivenPath],
+        read_question: Callable[[str, PoseStamped, PoseStamped], Question],
+        publish: Callable[[PathJudgement, IdentityReport], ResultMessages],
     ):
         """Create service and action, where their types are installed.
 
@@ -67,7 +63,7 @@ class Nav2Services:
             read_path: Returns a path of the robot as one of the body; refuses one that is too
                 long.
             read_question: Returns the question of a service, by start and goal of the robot.
-            publish: Publishes the results of a judgement and returns the plan first.
+            publish: Publishes the results of a judgement and returns them.
         """
         self._desk, self._publish = desk, publish
         self._read_path, self._read_question = read_path, read_question
@@ -126,7 +122,7 @@ class Nav2Services:
 
         def send(judged: PathJudgement, identity: IdentityReport) -> None:
             result = make_result()
-            result.path, _ = self._publish(judged, identity)
+            result.path = self._publish(judged, identity).plan
             seconds = time.monotonic() - begin
             result.planning_time = Duration(seconds=seconds).to_msg()
             result.error_code = getattr(result, _name_error(judged))

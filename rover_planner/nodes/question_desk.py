@@ -10,6 +10,7 @@ import contextlib
 import math
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -54,8 +55,8 @@ class Inquiry(Asked):
     """Map, settings, path and measurements; its map is that of the time of judging."""
     arrival: float
     """Time of its arrival [s], steady clock."""
-    ticket: int
-    """The maps that had come until then."""
+    last_map: Future[None]
+    """Done when the maps that had come until then are taken."""
 
 
 class QuestionDesk:
@@ -87,7 +88,7 @@ class QuestionDesk:
             lambda judgement: self._answer(inquiry, judgement, reply),
             snapshot=replace(self._service.snapshot(self._ros_time), watch=self._watch()),
             arrival=time.monotonic(),
-            ticket=self._maps.ticket(),
+            last_map=self._maps.last_job,
         )
         self._queue.ask(inquiry, values.max_waiting)
         if self._queue.open_count:
@@ -99,7 +100,7 @@ class QuestionDesk:
 
     def _judge(self, inquiry: Inquiry) -> Any:
         """Return the judgement of a question on the newest map; called in the queue's thread."""
-        self._maps.wait(inquiry.ticket, inquiry.budget.check)
+        self._maps.wait(inquiry.last_map, inquiry.budget.check)
         while True:
             inquiry.snapshot = self._service.add_map(inquiry.snapshot, self._ros_time)
             with contextlib.suppress(NewerMapError):

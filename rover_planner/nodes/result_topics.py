@@ -2,7 +2,7 @@
 """Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -10,12 +10,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, Header
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
-from msg_adapters.paths import PoseStock, decimate, settled_path
+from msg_adapters.paths import decimate, settled_path
 from msg_adapters.results.diagnostics import verdict_to_diagnostics
-from msg_adapters.results.grids import area_to_grid
+from msg_adapters.results.grids import NOT_REACHED, REACHED, occupancy_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import joint_trajectory, tip_over_array, wheel_array
 from msg_adapters.stamps import ns_to_stamp
@@ -36,20 +36,8 @@ WHEEL_TOPICS = {
     "torque_saturation": "torque_saturation",
 }
 """Topics with one value per waypoint and wheel, and the field of the prediction on each."""
-MAX_STOCK = 2000
-"""Number of pose and point messages that are kept for reuse."""
 SET_BACK = 1_000_000_000
 """Time [ns] up to which a clock that was set back counts as standing still."""
-
-RESULT_KINDS = {
-    "plan": Path,
-    **dict.fromkeys([*WHEEL_TOPICS, "tip_over_margin"], Float64MultiArray),
-    "predicted_joints": JointTrajectory,
-    "verdict": DiagnosticArray,
-    "closed_area": OccupancyGrid,
-    "markers": MarkerArray,
-}
-"""Topics in the order of publication, and their message types."""
 
 
 class ResultTopics:
@@ -59,42 +47,30 @@ class ResultTopics:
         """Create the topics; `inputs` know the rover, and joints and frame of messages."""
         self._node, self._inputs = node, inputs
         self._deferred_work = DeferredWork(node, node.guard)
-        self._poses = PoseStock()
-        self._points: list[JointTrajectoryPoint] = []
         self._stamp = 0
         self._topics = {
-            name: LazyPublisher(node, kind, f"~/{name}") for name, kind in RESULT_KINDS.items()
+            name: LazyPublisher(node, kind, f"~/{name}") for name, (kind, _) in RESULTS.items()
         }
 
-    def take(
-        self, judgement: PathJudgement, identity: IdentityReport
-    ) -> tuple[Path, Callable[[], VerdictReport]]:
-        """Return plan and report of a judgement; publish all results after the answer is sent.
+    def take(self, judgement: PathJudgement, identity: IdentityReport) -> "ResultMessages":
+        """Return the messages of a judgement; publish them after the answer is sent.
 
         Args:
             judgement: The answer.
             identity: What it is about; without a path, that of the plan is added.
-
-        Returns:
-            The plan, whose poses are valid until the next plan is made, and a function that
-            returns the report.
         """
         values, rover = self._node.values, self._inputs.service.settings.rover
         header = Header(frame_id=values.map_frame, stamp=ns_to_stamp(self._next_stamp()))
-        kept = self._inputs, self._poses, self._points
-        results = ResultMessages(judgement, identity, header, rover, values, *kept)
-        plan = results.plan()
+        results = ResultMessages(judgement, identity, header, rover, values, self._inputs)
         if judgement.traversable and not identity.path_hash:
-            path_hash, path_stamp = describe_path(plan)
-            identity = replace(identity, path_hash=path_hash, path_stamp=path_stamp)
-            results = replace(results, identity=identity)
+            path_hash, path_stamp = describe_path(results.plan)
+            results.identity = replace(identity, path_hash=path_hash, path_stamp=path_stamp)
         publications = [
-            partial(topic.publish, partial(results.message, name))
-            for name, topic in self._topics.items()
+            partial(self._topics[name].publish, partial(make, results))
+            for name, (_, make) in RESULTS.items()
         ]
-        log = partial(self._log, results)
-        self._deferred_work.do(log, *publications, self._shrink_stocks)
-        return plan, lambda: results.report
+        self._deferred_work.do(partial(self._log, results), *publications)
+        return results
 
     def _next_stamp(self) -> int:
         """Return the ROS time [ns], or just after the last stamp if the clock stands still.
@@ -106,11 +82,6 @@ class ResultTopics:
         self._stamp = self._stamp + 1 if stands else now
         return self._stamp
 
-    def _shrink_stocks(self) -> None:
-        """Drop messages beyond MAX_STOCK, which a long path has left behind."""
-        self._poses.shrink(MAX_STOCK)
-        del self._points[MAX_STOCK:]
-
     def _log(self, results: "ResultMessages") -> None:
         judgement, about = results.judgement, results.identity
         text = f"question {about.request}, {about.service}: {judgement.summary()}"
@@ -121,12 +92,11 @@ class ResultTopics:
 
     def serve_late_comers(self) -> None:
         """Publish the last results to new subscribers."""
-        awaited = [topic for topic in self._topics.values() if topic.is_awaited]
-        if awaited:
-            self._deferred_work.do(*(topic.catch_up for topic in awaited))
+        for topic in self._topics.values():
+            topic.catch_up()
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class ResultMessages:
     """The messages of one judgement; each is made on demand."""
 
@@ -142,10 +112,6 @@ class ResultMessages:
     """Parameters of the messages."""
     inputs: ServerInputs
     """Know joints and frames of messages."""
-    poses: PoseStock = field(default_factory=PoseStock)
-    """Poses to reuse."""
-    points: list[JointTrajectoryPoint] = field(default_factory=list)
-    """Points to reuse."""
 
     @property
     def prediction(self) -> PathPrediction | None:
@@ -158,30 +124,18 @@ class ResultMessages:
         """The report, with what it is about."""
         return replace(self.judgement.report, identity=self.identity)
 
-    def message(self, topic: str) -> object:
-        """Return the message for a topic; without values if no path was judged."""
-        makers: dict[str, Callable[[], object]] = {
-            "plan": self.plan,
-            "predicted_joints": self._joints,
-            "tip_over_margin": lambda: tip_over_array(self.prediction),
-            "verdict": self._verdict,
-            "closed_area": self._closed_area,
-            "markers": self._markers,
-        }
-        if topic in makers:
-            return makers[topic]()
-        return wheel_array(self.prediction, WHEEL_TOPICS[topic])
-
+    @cached_property
     def plan(self) -> Path:
-        """Return the path to drive, without poses if none is traversable."""
+        """The path to drive, without poses if none is traversable."""
         candidate = self.judgement.candidate
         if candidate is None or not self.judgement.traversable:
             return Path(header=self.header)
         return self.inputs.frames.to_base(
-            settled_path(candidate.prediction, self._rows_to_show(), self.header, self.poses)
+            settled_path(candidate.prediction, self._rows_to_show(), self.header)
         )
 
-    def _verdict(self) -> DiagnosticArray:
+    def verdict(self) -> DiagnosticArray:
+        """Return the verdict and its summary."""
         judgement, report = self.judgement, self.report
         level = "warning" if report.has_warning else "ok"
         return verdict_to_diagnostics(
@@ -189,20 +143,23 @@ class ResultMessages:
             self.rover.name, self.header,
         )  # fmt: skip
 
-    def _closed_area(self) -> OccupancyGrid:
+    def closed_area(self) -> OccupancyGrid:
         """Return the area that start or goal are closed in; without places if they are not."""
         around = self.judgement.around
         if around is None or around.closed is None:
             return OccupancyGrid(header=self.header)
         cell, (column, row) = around.nodes.cell, around.nodes.first
         first = cell * column, cell * row
-        return area_to_grid(around.closed.places, cell, first, self.header)
+        values = np.where(around.closed.places, REACHED, NOT_REACHED)
+        return occupancy_grid(values, cell, first, self.header)
 
-    def _joints(self) -> JointTrajectory:
+    def joints(self) -> JointTrajectory:
+        """Return the predicted joints, without points if no path was judged."""
         names = self.inputs.joint_names
-        return joint_trajectory(self.prediction, self.rover, self.header, self.points, names)
+        return joint_trajectory(self.prediction, self.rover, self.header, names)
 
-    def _markers(self) -> MarkerArray:
+    def markers(self) -> MarkerArray:
+        """Return markers of the path; if none was judged, the one that deletes all."""
         candidate = self.judgement.candidate
         if candidate is None:
             return cleared_markers(self.header)
@@ -217,3 +174,23 @@ class ResultMessages:
         return decimate(
             candidate.prediction.poses, self.values.plan_spacing, self.judgement.changes()
         )
+
+
+Maker = Callable[[ResultMessages], object]
+
+
+def _of_wheels(field: str) -> tuple[type, Maker]:
+    """Return type and maker of a message with values of wheels: a field of the prediction."""
+    return Float64MultiArray, lambda one: wheel_array(one.prediction, field)
+
+
+RESULTS: dict[str, tuple[type, Maker]] = {
+    "plan": (Path, lambda one: one.plan),
+    **{topic: _of_wheels(field) for topic, field in WHEEL_TOPICS.items()},
+    "tip_over_margin": (Float64MultiArray, lambda one: tip_over_array(one.prediction)),
+    "predicted_joints": (JointTrajectory, ResultMessages.joints),
+    "verdict": (DiagnosticArray, ResultMessages.verdict),
+    "closed_area": (OccupancyGrid, ResultMessages.closed_area),
+    "markers": (MarkerArray, ResultMessages.markers),
+}
+"""Type and maker of the message of each topic, in the order of publication."""

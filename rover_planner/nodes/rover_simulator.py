@@ -31,6 +31,7 @@ from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.rover_file import load_rover
 from rover_planner.maps.known_map import describe_terrain
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import SIMULATION
@@ -41,7 +42,7 @@ from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.simulator.plant import PlantState
-from rover_planner.simulator.simulation import Simulation, load_simulation_settings
+from rover_planner.simulator.simulation import Simulation, load_ground
 
 NODE_NAME = "rover_simulator"
 COMMANDS, BRAKE = "traction_controller/commands", "traction_controller/brake"
@@ -72,10 +73,10 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         self._frame = parameters.map_frame
         self._joint_names = JointNames(steering=parameters.steering_sign)
         self._order = joint_order(parameters.joints)
-        self._settings = load_simulation_settings(parameters)
+        rover, terrain = load_rover(parameters.rover), load_ground(parameters)
         if parameters.engine == QUASI_STATIC:
             load_kernels(SIMULATION, (), self.get_logger().info)
-        self.simulation = Simulation(self._settings)
+        self.simulation = Simulation(rover, terrain, parameters)
         """The rover."""
         self._period = 1.0 / parameters.rate
         self._standing_steps = max(1, round(STANDING_PERIOD * parameters.rate))
@@ -94,9 +95,9 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._begin_map()
         self.get_logger().info(
-            f"ready: rover {self._settings.rover.name} on {parameters.engine}, starts at "
-            f"{', '.join(f'{value:.2f}' for value in self._settings.start)}, terrain "
-            f"{parameters.terrain_file or 'made'}: {describe_terrain(self._settings.terrain)}"
+            f"ready: rover {rover.name} on {parameters.engine}, starts at "
+            f"{parameters.start_x:.2f}, {parameters.start_y:.2f}, {parameters.start_yaw:.2f}, "
+            f"terrain {parameters.terrain_file or 'made'}: {describe_terrain(terrain)}"
         )
 
     def _create_publishers(self) -> None:
@@ -110,19 +111,19 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         if self.get_parameter("use_sim_time").value:
             self._clock_publisher = self.create_publisher(ClockMessage, "/clock", qos)
         self._commands = None
-        if self._settings.parameters.follow_commands:
+        if self.values.follow_commands:
             self._commands = self.create_publisher(TwistStamped, "cmd_vel", qos)
         broadcaster: Any = find_type("tf2_ros:TransformBroadcaster")
         self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
-        qos, hear = topic_qos(), self.heard.subscribe
-        hear(Bool, STOP, self._take_stop, qos)
+        qos, hear, rover = topic_qos(), self.heard.subscribe, self.simulation
+        hear(Bool, STOP, lambda one, arrival: rover.take_stop(one.data, arrival), qos)
         hear(Path, "path", self._take_path, qos)
         hear(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
-        if self._settings.parameters.follow_commands:
+        if self.values.follow_commands:
             hear(Float64MultiArray, COMMANDS, self._take_torques, sensor_qos())
-            hear(Bool, BRAKE, self._take_brake, latched_qos())
+            hear(Bool, BRAKE, lambda one, _: rover.take_brake(one.data), latched_qos())
 
     def _take_path(self, path: Path, _arrival: float) -> None:
         self.simulation.take_path(path_to_poses(path, self._frame))
@@ -141,12 +142,6 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         torques = np.empty(6)
         torques[self._order] = efforts
         self.simulation.take_torques(torques, arrival)
-
-    def _take_brake(self, message: Bool, _arrival: float) -> None:
-        self.simulation.take_brake(message.data)
-
-    def _take_stop(self, message: Bool, arrival: float) -> None:
-        self.simulation.take_stop(message.data, arrival)
 
     def _advance(self) -> None:
         self.heard.poll()
@@ -184,7 +179,7 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
             state.position, state.orientation, state.velocity, state.body_rates,
             (COVARIANCE, COVARIANCE), self._frame, stamp,
         )  # fmt: skip
-        gravity = self._settings.rover.gravity
+        gravity = self.simulation.rover.gravity
         imu = imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
         return joint_state(positions, velocities, efforts, stamp), odometry, imu
 
@@ -196,7 +191,7 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         return ns_to_stamp(self._start + round(self._steps * self._period * NANOSECONDS))
 
     def _arm_angles(self) -> dict[str, float]:
-        arm = self._settings.rover.manipulator
+        arm = self.simulation.rover.manipulator
         return {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
 
     def _log_stop(self, state: PlantState) -> None:
@@ -222,7 +217,7 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         level, text = (
             ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
-        status = make_status(SIMULATOR, level, text, values, self._settings.rover.name)
+        status = make_status(SIMULATOR, level, text, values, self.simulation.rover.name)
         header = Header(stamp=self._stamp)
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 

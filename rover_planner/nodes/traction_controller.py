@@ -82,8 +82,11 @@ class TractionController(RoverNode[TractionControllerParameters]):
         order = joint_order(values.joints, names)
         self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
         self._create_switches()
-        self._watchdog = Watchdog(self._send_watchdog_command)
-        self.follow_changes(self._load, self._apply_settings)
+        self._watchdog = Watchdog(lambda: self._topics.write(np.zeros(WHEEL_COUNT), True, FAULT))
+        self.follow_changes(
+            lambda changed: load_traction_settings(changed, self.service.settings),
+            self._apply_settings,
+        )
         self._timer = self.loop = create_steady_timer(self, 1.0 / values.rate, self.update)
         create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self.get_logger().info(
@@ -126,9 +129,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         for qos in (topic_qos(), latched_qos(), sensor_qos()):
             self.heard.subscribe(Bool, "~/emergency_stop", self._take_emergency_stop, qos)
 
-    def _load(self, parameters: TractionControllerParameters) -> TractionSettings:
-        return load_traction_settings(parameters, self.service.settings)
-
     def _apply_settings(self, settings: TractionSettings) -> None:
         values = self.values
         self._supervisor.configure(settings)
@@ -137,20 +137,19 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._maps.apply(values)
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        before = self._supervisor.permission.enabled
-        done, message = self._supervisor.permission.set_enabled(request.data)
+        before = self._supervisor.enabled
+        done, message = self._supervisor.set_enabled(request.data)
         response.success, response.message = done, message
-        if self._supervisor.permission.enabled != before or not done:
+        if self._supervisor.enabled != before or not done:
             self.get_logger().info(message)
             self._repeats = MOST_REPEATS  # the next update is a whole one
             self.update()
         return response
 
     def _take_emergency_stop(self, message: Bool, _arrival: float) -> None:
-        permission = self._supervisor.permission
-        if message.data == permission.emergency_stop:
+        if message.data == self._supervisor.emergency_stop:
             return
-        permission.take_emergency_stop(message.data)
+        self._supervisor.take_emergency_stop(message.data)
         self.get_logger().warning(
             "emergency stop" if message.data else "emergency stop released; ~/enable drives again"
         )
@@ -235,10 +234,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         next_update = now + max(self.values.watchdog_timeout, MIN_WATCHDOG_PERIODS * period)
         return min(next_update, max(command.expiry, now) + STALE_PERIODS * period)
 
-    def _send_watchdog_command(self) -> None:
-        """Send zero torques and the brake; called in the thread of the watchdog."""
-        self._topics.write(np.zeros(WHEEL_COUNT), True, FAULT)
-
     def _log_changes(self, command: TractionCommand, now: float) -> None:
         """Log the begin and the end of faults and stalls; show a new state in the diagnostics."""
         last, self._command = self._command, command
@@ -254,7 +249,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
             self._warning = command.warning
 
     def _publish_diagnostics(self) -> None:
-        self._maps.look_for_frame()
+        self._maps.retry()
         command = self._command
         if command is None:
             return

@@ -3,7 +3,7 @@
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
-from msg_adapters.identity import path_hash, plan_request_hash
+from msg_adapters.identity import plan_request_hash
 from msg_adapters.paths import count_poses
 from msg_adapters.results.diagnostics import HEALTH, MONITOR, make_status, to_json
 from msg_adapters.stamps import NANOSECONDS
@@ -31,7 +31,7 @@ from rover_planner.nodes.nav2_services import Nav2Services
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
-from rover_planner.nodes.result_topics import ResultTopics
+from rover_planner.nodes.result_topics import ResultMessages, ResultTopics
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
@@ -52,7 +52,7 @@ from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.path_query import Pose
-from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
+from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
@@ -107,7 +107,6 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._map_cloud = MapCloud(self, self.service)
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
-        self.urgent_threads = (self.watch.heartbeat_thread,)
         self._hazards = HazardTopics(self, self.service, self.desk.give_way)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._diagnostics_due = 0.0
@@ -243,7 +242,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         )
 
         def send(judged: PathJudgement, identity: IdentityReport) -> None:
-            response.plan, _ = self.publish(judged, identity)
+            response.plan = self.publish(judged, identity).plan
             reply(response)
 
         self.desk.ask(question, send)
@@ -296,24 +295,20 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
         def send(judged: PathJudgement, identity: IdentityReport) -> None:
             about = replace(identity, path_hash=path.hash, path_stamp=path.stamp)
-            _, report = self.publish(judged, about)
             response.success = judged.traversable
-            response.message = to_json(report().to_dict())
+            response.message = to_json(self.publish(judged, about).report.to_dict())
             reply(response)
 
         self.desk.ask(ask_about_path("check_path", path.hash, path), send)
 
-    def publish(
-        self, judgement: PathJudgement, identity: IdentityReport
-    ) -> tuple[Path, Callable[[], VerdictReport]]:
-        """Return plan and report of a judgement; its results are published after the answer."""
-        plan, report = self._results.take(judgement, identity)
+    def publish(self, judgement: PathJudgement, identity: IdentityReport) -> ResultMessages:
+        """Return the results of a judgement, which are published after the answer."""
+        results = self._results.take(judgement, identity)
         self._advice.take(judgement)
         if judgement.traversable and judgement.candidate is not None:
-            poses = judgement.candidate.poses
-            self.watch.accept(poses, identity.path_hash or path_hash(plan))
+            self.watch.accept(judgement.candidate.poses, results.identity.path_hash)
             self._set_pace()
-        return plan, report
+        return results
 
     def _publish_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
         """Publish why the rover is to stop, as the results of a judged path."""

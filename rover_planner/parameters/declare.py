@@ -4,7 +4,6 @@
 import difflib
 from array import array
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -27,13 +26,13 @@ def declare_parameters(node: Node, table: type[Table]) -> Table:
     Raises:
         ParameterError: An override is not allowed by the table.
     """
-    found = []
-    for spec in specs_of(table):
+    specs = specs_of(table)
+    for spec in specs:
         _check_override(node, table, spec)
-        node.declare_parameter(spec.name, spec.ros_default, _descriptor(spec))
-        found.append(node.get_parameter(spec.name))
-    _warn_of_unknown_parameters(node, [spec.name for spec in specs_of(table)])
-    return replace(table(), **values_in(table, found))
+    rows = [(spec.name, spec.ros_default, _descriptor(spec)) for spec in specs]
+    found = node.declare_parameters("", rows)
+    _warn_of_unknown_parameters(node, [spec.name for spec in specs])
+    return table(**values_in(table, found))
 
 
 def _warn_of_unknown_parameters(node: Node, names: list[str]) -> None:
@@ -55,7 +54,7 @@ def _check_override(node: Node, table: type[ParameterTable], spec: ParameterSpec
     if given is None:
         return
     is_empty = given.type_ == Parameter.Type.NOT_SET
-    replace(table(), **({spec.name: ()} if is_empty else values_in(table, [given])))
+    table(**({spec.name: ()} if is_empty else values_in(table, [given])))
     if is_empty:
         raise ParameterError(
             f"parameter {spec.name} is [], which has no type in ROS; leave it out, its default is "

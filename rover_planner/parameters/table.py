@@ -3,20 +3,13 @@
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar
 
 from rover_planner.errors import PlanningError
 
 Value = TypeVar("Value")
 
-_ROS_TYPES: dict[Any, str] = {
-    str: "string",
-    float: "double",
-    int: "integer",
-    bool: "bool",
-    tuple[str, ...]: "string array",
-    tuple[float, ...]: "double array",
-}
+_ROS_TYPES: dict[type, str] = {str: "string", float: "double", int: "integer", bool: "bool"}
 
 
 class ParameterError(PlanningError):
@@ -29,10 +22,8 @@ class ParameterSpec:
 
     name: str
     """Name of the parameter, and of the field."""
-    type_name: str
-    """ROS name of the type."""
     default: Any
-    """Default value."""
+    """Default value; an array has items."""
     meaning: str
     """Meaning, in one sentence, for `ros2 param describe` and the documentation."""
     unit: str
@@ -43,6 +34,13 @@ class ParameterSpec:
     """Allowed texts; empty allows any."""
     read_only: bool
     """True if the value is fixed after the start of the node."""
+
+    @property
+    def type_name(self) -> str:
+        """ROS name of the type."""
+        if isinstance(self.default, tuple):
+            return f"{_ROS_TYPES[type(self.default[0])]} array"
+        return _ROS_TYPES[type(self.default)]
 
     @property
     def ros_default(self) -> Any:
@@ -105,7 +103,7 @@ def parameter(
     read_only: bool = False,
 ) -> Value:
     """Make a field of a `ParameterTable`; `ParameterSpec` explains the arguments."""
-    spec = ParameterSpec("", "", default, meaning, unit, bounds, choices, read_only)
+    spec = ParameterSpec("", default, meaning, unit, bounds, choices, read_only)
     made: Any = field(default=default, metadata={"spec": spec})
     return made  # a dataclass field at run time; type checkers see the type of its value
 
@@ -128,13 +126,8 @@ class ParameterTable:
 
 def specs_of(table: type[ParameterTable]) -> tuple[ParameterSpec, ...]:
     """Return the rows of a table in the order of its fields."""
-    types, specs = get_type_hints(table), {row.name: row.metadata["spec"] for row in fields(table)}
+    specs = {row.name: row.metadata["spec"] for row in fields(table)}
     return tuple(
-        replace(
-            spec,
-            name=name,
-            type_name=_ROS_TYPES[types[name]],
-            read_only=table.all_read_only or spec.read_only,
-        )
+        replace(spec, name=name, read_only=table.all_read_only or spec.read_only)
         for name, spec in specs.items()
     )

@@ -57,7 +57,7 @@ class PathQueryOptions:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A path with its prediction, its verdict and its cost."""
+    """A path with its prediction and its verdict."""
 
     poses: NDArray[np.float64]
     """x, y [m] and yaw [rad] of the body origin at each waypoint, (n, 3), map frame."""
@@ -66,9 +66,18 @@ class Candidate:
     failure or a little beyond it."""
     verdict: Verdict
     """Verdict on the path, with the reason if the rover may not drive it."""
-    cost: tuple[float, float]
-    """Risk (used share of a safety limit, in steps of RISK_STEP) and energy [J]; both infinite
-    if the path is not traversable."""
+
+    @property
+    def cost(self) -> tuple[float, float]:
+        """Risk (used share of a safety limit, in steps of RISK_STEP) and energy [J].
+
+        Both are infinite if the path is not traversable or one of them is not a number.
+        """
+        if not self.verdict.traversable:
+            return (math.inf, math.inf)
+        risk = np.floor(self.verdict.risk / RISK_STEP + 0.5) * RISK_STEP
+        cost = (float(risk), float(self.prediction.energy[-1]))
+        return (math.inf, math.inf) if math.isnan(sum(cost)) else cost
 
     @property
     def is_complete(self) -> bool:
@@ -92,8 +101,7 @@ class Candidate:
         """Return the path, refused at a waypoint for what the model does not know."""
         codes, reasons = [""] * len(self.poses), [""] * len(self.poses)
         codes[waypoint], reasons[waypoint] = code, reason
-        verdict = with_refusals(self.verdict, codes, reasons)
-        return replace(self, verdict=verdict, cost=(math.inf, math.inf))
+        return replace(self, verdict=with_refusals(self.verdict, codes, reasons))
 
 
 @dataclass(frozen=True)
@@ -182,10 +190,7 @@ def answer_path_query(
     judged = judge_paths(
         rover, terrain, paths, options.model, sigmas=options.map_sigmas, stop_at_failure=True
     )
-    candidates = [
-        Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
-        for poses, (prediction, verdict) in zip(paths, judged, strict=True)
-    ]
+    candidates = [Candidate(poses, *one) for poses, one in zip(paths, judged, strict=True)]
     return choose_by_chance(rover, terrain, candidates, options)
 
 
@@ -249,7 +254,7 @@ def check_path(
     """
     options = options or PathQueryOptions()
     poses = np.array(poses, np.float64)
-    prediction, verdict = judge_path(
+    judged = judge_path(
         rover,
         terrain,
         poses,
@@ -260,7 +265,7 @@ def check_path(
         chance_of_refused=False,
         known=known,
     )
-    return Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
+    return Candidate(poses, *judged)
 
 
 def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
@@ -270,15 +275,3 @@ def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
     if passable:
         return PathAnswer(candidates, min(passable, key=lambda k: candidates[k].cost))
     return PathAnswer(candidates, max(indices, key=lambda k: candidates[k].passable_share))
-
-
-def path_cost(prediction: PathPrediction, verdict: Verdict) -> tuple[float, float]:
-    """Return the cost of a path: its risk in steps of RISK_STEP, and its energy [J].
-
-    Both are infinite if the path is not traversable or one of them is not a number.
-    """
-    if not verdict.traversable:
-        return (np.inf, np.inf)
-    risk = np.floor(verdict.risk / RISK_STEP + 0.5) * RISK_STEP
-    cost = (float(risk), float(prediction.energy[-1]))
-    return (np.inf, np.inf) if math.isnan(sum(cost)) else cost

@@ -59,6 +59,9 @@ class Frames:
         offset = parameters.base_offset
         self._offset = Rigid.from_rpy(*offset) if any(offset) else None
 
+    def listen(self) -> None:
+        """Begin to hear of transforms, unless `take_transform` is called with all of them."""
+
     def apply_timeout(self, timeout: float) -> None:
         """Take the age from which transforms, and odometry for clouds, are refused [s]."""
         self._tree.timeout = self._driven.timeout = timeout

@@ -37,11 +37,6 @@ class LazyPublisher:
         """True if there is a subscriber."""
         return self._publisher.get_subscription_count() > 0
 
-    @property
-    def is_awaited(self) -> bool:
-        """True if a subscriber has not received the latest message."""
-        return self._make is not None and self.has_listeners
-
     def publish(self, make: Callable[[], Any]) -> None:
         """Publish the message that `make` returns, now or when the first subscriber arrives."""
         self._make = make

@@ -2,12 +2,10 @@
 """Prepares maps in a thread of their own, so that a node goes on meanwhile."""
 
 import contextlib
-import math
-import threading
 import time
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -24,11 +22,6 @@ from rover_planner.planning.navigation.transforms import Rigid, TransformError
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.logs import RepeatLog
 
-WAIT = 0.02
-"""Time between two checks of who waits for a map [s]."""
-END_TIME = 2.0
-"""Longest wait for the map in work when the intake is closed [s]."""
-
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 """Topics of maps: PointCloud2, and GridMap where its package is installed."""
 
@@ -43,7 +36,7 @@ class MapIntake(ABC):
     """
 
     def __init__(self, logger: RcutilsLogger, values: Any, frames: Frames):
-        """Start the thread.
+        """Begin without a map.
 
         Args:
             logger: Logs refusals, those of one kind once in a while.
@@ -56,15 +49,12 @@ class MapIntake(ABC):
         """Topic of the map in work."""
         self._logger, self._frames, self._refusals = logger, frames, RepeatLog()
         self._unplaced: tuple[str, int | None] | None = None
-        self._changed = threading.Condition()
         self._last: tuple[bytes, type] | None = None
         self._used: Any = None
-        self._newest: dict[type, int] = {}
-        self._jobs: deque[Callable[[], Any]] = deque()
-        self._given, self._done = 0, 0
-        self._ending = False
-        self._thread = threading.Thread(target=self._run, name="maps", daemon=True)
-        self._thread.start()
+        self._offers: dict[type, int] = {}
+        self._pool = ThreadPoolExecutor(1, "maps")
+        self.last_job: Future[None] = self.do(self.expect_other)
+        """What was given to the thread last; it is done after all that was given before."""
 
     @abstractmethod
     def prepare(self, message: Any, source: Rigid | None) -> None:
@@ -109,17 +99,13 @@ class MapIntake(ABC):
         if last is not None:
             self._do_latest(*last)
 
-    @property
-    def waits_for_frame(self) -> bool:
-        """True if no transform was known for the last message."""
-        return self._unplaced is not None
-
     def retry(self) -> None:
         """Prepare the last message again if its transform has come meanwhile; call it each second.
 
         A map that is published once may arrive before the first transform.
         """
         if self._unplaced is not None:
+            self._frames.listen()  # only then: /tf of a whole robot costs a loop its time
             with contextlib.suppress(TransformError):
                 self._frames.find(*self._unplaced)
                 self._unplaced = None
@@ -134,63 +120,27 @@ class MapIntake(ABC):
         self._last = None
         self.expect_other()
 
-    def do(self, job: Callable[[], Any]) -> None:
+    def do(self, job: Callable[[], Any]) -> Future[None]:
         """Call a function in the thread after all that was given before."""
-        with self._changed:
-            self._given += 1
-            self._jobs.append(job)
-            self._changed.notify_all()
-
-    def ticket(self) -> int:
-        """Return a number for `wait`: all that was given until now."""
-        return self._given
-
-    def wait(self, ticket: int, check: Callable[[], object], longest: float = math.inf) -> None:
-        """Wait until all that was given before a ticket is done; `check` may raise meanwhile.
-
-        Args:
-            ticket: What `ticket` returned.
-            check: Called every WAIT.
-            longest: Time after which the wait ends whatever is done [s].
-        """
-        end = time.monotonic() + longest
-        with self._changed:
-            while self._done < ticket and not self._ending:
-                left = end - time.monotonic()
-                if left <= 0.0:
-                    return
-                self._changed.wait(min(WAIT, left))
-                check()
+        self.last_job = self._pool.submit(self._run, job)
+        return self.last_job
 
     def close(self) -> None:
         """End the thread after the map in work is prepared."""
-        with self._changed:
-            self._ending = True
-            self._changed.notify_all()
-        self._thread.join(END_TIME)
+        self._pool.shutdown(cancel_futures=True)
 
     def _do_latest(self, message: bytes, kind: type) -> None:
-        self._newest[kind] = self._given + 1
-        self.do(partial(self._prepare_map, message, kind, self._newest[kind]))
+        number = self._offers[kind] = self._offers.get(kind, 0) + 1
+        self.do(partial(self._prepare_map, message, kind, number))
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._jobs or self._ending)
-                if self._ending:
-                    return
-                job = self._jobs.popleft()
-            try:
-                job()
-            except Exception as error:
-                # An internal error must not end the thread: the next map may work.
-                self.refuse(f"internal error: {type(error).__name__}: {error}")
-            with self._changed:
-                self._done += 1
-                self._changed.notify_all()
+    def _run(self, job: Callable[[], Any]) -> None:
+        try:
+            job()
+        except Exception as error:
+            self.refuse(f"internal error: {type(error).__name__}: {error}")
 
     def _prepare_map(self, message: bytes, kind: type, number: int) -> None:
-        if number < self._newest[kind]:
+        if number < self._offers[kind]:
             return
         self.topic = CLOUD if kind is PointCloud2 else GRID_MAP
         self._unplaced = None

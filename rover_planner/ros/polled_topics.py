@@ -7,7 +7,6 @@ longer than most messages do.
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -27,26 +26,13 @@ Refuse = Callable[[str, Exception, float], object]
 """Takes the name of a topic, what `Take` has raised of a message, and when that came [s]."""
 
 
-@dataclass(frozen=True)
-class _Topic:
-    """A topic that is polled."""
-
-    subscription: Subscription
-    kind: type
-    name: str
-    take: Take
-    depth: int
-    is_due: Callable[[], bool]
-    refuse: Refuse
-
-
 class PolledTopics:
     """Subscriptions of a node that are read by `poll`, in the executor's thread."""
 
     def __init__(self, node: Node, guard: Guard):
         """Begin without topics; `guard` takes unexpected errors."""
         self._node, self._guard, self._group = node, guard, _Apart()
-        self._topics: list[_Topic] = []
+        self._topics: list[tuple[Subscription, Callable[[], bool], Refuse]] = []
         self._polled = time.monotonic()
         self._reader, self._refusals = SensorReader(), RepeatLog()
 
@@ -72,39 +58,40 @@ class PolledTopics:
         topic = self._node.create_subscription(
             kind, name, take, qos, callback_group=self._group, raw=self._reader.reads(kind)
         )
-        self._topics.append(
-            _Topic(topic, kind, name, take, qos.depth, is_due, refuse or self._refuse)
-        )
+        self._topics.append((topic, is_due, refuse or self._refuse))
 
     def poll(self) -> None:
         """Read all that has come since the last time, in the order of its arrival."""
         before, self._polled = self._polled, time.monotonic()
         arrived = [
-            found for topic in self._topics if topic.is_due() for found in self._take(topic)
+            (*found, topic, refuse)
+            for topic, is_due, refuse in self._topics
+            if is_due()
+            for found in self._take(topic)
         ]
-        for at, topic, found in sorted(arrived, key=lambda one: one[0]):
+        for at, found, topic, refuse in sorted(arrived, key=lambda one: one[0]):
             # Since the last poll at most, whatever the system clock was set to meanwhile.
             age, now = (time.time_ns() - at) / NANOSECONDS, time.monotonic()
             arrival = now - min(max(age, 0.0), now - before)
             try:
-                is_raw = topic.subscription.raw
-                topic.take(self._reader.read(found, topic.kind) if is_raw else found, arrival)
+                message = self._reader.read(found, topic.msg_type) if topic.raw else found
+                topic.callback(message, arrival)
             except Exception as error:
-                topic.refuse(topic.name, error, arrival)
+                refuse(topic.topic, error, arrival)
 
-    def _take(self, topic: _Topic) -> list[tuple[int, _Topic, Any]]:
-        """Return what has come, with its time [ns]."""
-        one, arrived = topic.subscription, []
-        for _ in range(topic.depth):
+    def _take(self, topic: Subscription) -> list[tuple[int, Any]]:
+        """Return what has come, each after its time [ns]."""
+        arrived = []
+        for _ in range(topic.qos_profile.depth):
             try:
-                with one.handle:
-                    found = one.handle.take_message(one.msg_type, one.raw)
+                with topic.handle:
+                    found = topic.handle.take_message(topic.msg_type, topic.raw)
             except Exception as error:
-                self._guard.report(f"reading of {topic.name}", error)
+                self._guard.report(f"reading of {topic.topic}", error)
                 continue
             if found is None:
                 break
-            arrived.append((found[1]["received_timestamp"], topic, found[0]))
+            arrived.append((found[1]["received_timestamp"], found[0]))
         return arrived
 
     def _refuse(self, name: str, error: Exception, now: float) -> None:

@@ -15,6 +15,7 @@ from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.maps.ground_beneath import Standing
@@ -22,10 +23,9 @@ from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.measurements import MAX_AGE
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.answering.traverse_service import MAX_AGE, TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
 
@@ -60,9 +60,9 @@ class ServerInputs:
         """Knows map, path and measurements."""
         self.keeper = MapKeeper(self.service.settings.rover, parameters)
         """Makes one map of those that come."""
-        self.joint_names = read_joint_map(
-            parameters.joint_map, self.service.all_joint_names, parameters.steering_sign
-        )
+        arm = self.service.settings.manipulator_joints
+        joints = SUSPENSION_JOINTS + WHEEL_JOINTS + STEERING_JOINTS + arm
+        self.joint_names = read_joint_map(parameters.joint_map, joints, parameters.steering_sign)
         """Names of the joints in messages."""
         self._mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
         self._clock, self._looked = clock, -float("inf")
@@ -83,7 +83,8 @@ class ServerInputs:
         Raises:
             MessageError: A value is wrong.
         """
-        self.service.take_joints(self.joint_names.positions(state, self.service.joint_names))
+        heard = SUSPENSION_JOINTS + self.service.settings.manipulator_joints
+        self.service.take_joints(self.joint_names.positions(state, heard))
 
     def take_odometry(self, odometry: Any) -> None:
         """Take the pose of the robot, as `SensorReader` reads it.
@@ -92,8 +93,7 @@ class ServerInputs:
             RoverError: A value is wrong, or the frame is not known.
         """
         pose, _ = self.frames.take_odometry(odometry)
-        z, roll, pitch = pose[2:5].tolist()
-        self.service.take_pose(pose[[0, 1, 5]], (z, roll, pitch))
+        self.service.take_pose(pose)
 
     def find_here(self, max_age: float = MAX_AGE) -> Floats | None:
         """Return the pose (3,) of the body by /tf, else by odometry that is not older [s].

@@ -90,32 +90,23 @@ def join_poses(words: Sequence[str]) -> list[str]:
         if name not in SIZES:
             joined.append(words[k - 1])
             continue
-        parts = [first] if equals else []
-        while k < len(words) and _count(parts) < SIZES[name] and _is_list(words[k]):
-            parts.append(words[k].strip(" ,"))
+        parts = BETWEEN.split(first.strip()) if equals else []
+        while k < len(words) and len(parts) < SIZES[name] and (more := _numbers_in(words[k])):
+            parts += more
             k += 1
-        if parts:
-            joined.append(f"{name}={','.join(parts)}")
-        else:
-            joined.append(name)
+        joined.append(f"{name}={','.join(parts)}" if parts else name)
     return joined
 
 
 def split_numbers(words: Sequence[str]) -> list[str]:
     """Return words with each list of numbers with commas as one word for each number."""
-    split: list[str] = []
-    for word in words:
-        split += BETWEEN.split(word.strip(" ,")) if _is_list(word) else [word]
-    return split
+    return [part for word in words for part in _numbers_in(word) or [word]]
 
 
-def _count(parts: Sequence[str]) -> int:
-    return sum(len(BETWEEN.split(part.strip())) for part in parts)
-
-
-def _is_list(word: str) -> bool:
-    """Return whether a word has nothing but numbers, with commas or blanks between them."""
+def _numbers_in(word: str) -> list[str]:
+    """Return the numbers of a word, with commas or blanks between them; none if it has others."""
+    parts = BETWEEN.split(word.strip(" ,"))
     try:
-        return bool([float(part) for part in BETWEEN.split(word.strip(" ,"))])
+        return parts if [float(part) for part in parts] else []
     except ValueError:
-        return False
+        return []

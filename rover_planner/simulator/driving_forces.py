@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Computes the forces on a rover under given wheel torques: tractions, loads and net push."""
+"""Computes the forces on a rover under given wheel torques: net push and use of friction."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
@@ -25,16 +24,10 @@ class DrivingForces:
 
     push: float
     """Net force along the rolling motion of the wheels that accelerates the rover [N]."""
-    loads: Floats
-    """(6,) normal forces, at least 0 [N]."""
     utilisation: Floats
     """(6,) friction utilisation; 1 for a sliding wheel."""
     sliding: NDArray[np.bool_]
     """(6,) True if the motor's force exceeds the friction limit."""
-
-    def name_sliding(self) -> str:
-        """Return the names of the sliding wheels, separated by commas."""
-        return ", ".join(name for name, slides in zip(WHEELS, self.sliding, strict=True) if slides)
 
 
 def find_driving_forces(
@@ -51,7 +44,7 @@ def find_driving_forces(
             rest.
 
     Returns:
-        The forces; zero push and the loads of `here` if the balance has no unique solution.
+        The forces; zero push and the utilisation of `here` if the balance has no unique solution.
     """
     friction, loads, lateral = here.friction[0], here.wheel_loads[0], here.lateral[0]
     resistance = np.nan_to_num(here.motion_resistance[0])
@@ -67,7 +60,7 @@ def find_driving_forces(
         try:
             rows = writer.write(state, push)
         except ModelError:
-            return DrivingForces(0.0, loads, here.friction_utilisation[0], sliding)
+            return DrivingForces(0.0, here.friction_utilisation[0], sliding)
         x = rows.complete(tractions / rows.force_unit) * rows.force_unit
         push += float((rows.directions * (tractions - x[TRACTIONS])).sum())
         loads, lateral = x[LOADS], rows.lateral_forces(x)
@@ -76,7 +69,7 @@ def find_driving_forces(
     if not direction:  # at rest, a push below the soil's resistance has no effect
         push = float(np.sign(push) * max(abs(push) - resistance.sum(), 0.0))
     utilisation = np.where(sliding, 1.0, np.minimum(used, 1.0))
-    return DrivingForces(push, loads, utilisation, sliding)
+    return DrivingForces(push, utilisation, sliding)
 
 
 def measure_state(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> MeasuredState:

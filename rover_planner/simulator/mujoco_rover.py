@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rover on rigid ground in MuJoCo, moved by wheel torques or by speed servos.
+"""The plant that simulates a rover on rigid ground in MuJoCo, with inertia and wheel slip.
 
 It needs the package mujoco (extra `bench`). It shares only the rover's numbers with the model of
 `rover_physics`. The simulation has rigid bodies, hinges, a differential that couples the rockers,
@@ -20,6 +20,7 @@ from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.simulator.mujoco_model import thin_out, write_model
+from rover_planner.simulator.plant import PlantState
 
 TIMESTEP = 0.004
 """Time step of the simulation [s]."""
@@ -35,6 +36,8 @@ MIN_LOAD = 1e-3
 """Load above which a wheel has ground contact, as a share of the rover's weight."""
 DERATING_SHARE = 0.2
 """Share of the maximum speed, at its upper end, over which the motor torque falls to zero."""
+MAX_TILT = 1.2
+"""Tilt above which a rover counts as tipped over [rad]."""
 
 _WHEELS = slice(len(SUSPENSION_JOINTS), len(SUSPENSION_JOINTS) + len(WHEEL_JOINTS))
 """The wheel joints among the joints of the rover."""
@@ -53,7 +56,7 @@ class WheelContacts:
 
 
 class MujocoRover:
-    """A rover on one terrain, simulated by MuJoCo."""
+    """A rover on one terrain, moved by speeds or torques; with fixed wheels it skids in curves."""
 
     def __init__(
         self,
@@ -107,7 +110,9 @@ class MujocoRover:
         """Why the rover cannot follow the last command; empty if it can."""
         self._integral = np.zeros(6)
         self._bodies = np.array([self._model.body(name).id for name in WHEELS])
+        self._arms = np.repeat([1.0, -1.0], 3) * abs(rover.suspension.wheels["middle"][1])
         self._drop(pose)
+        self._torques, self._velocity, self._last = np.zeros(6), np.zeros(3), self.position
 
     def _drop(self, pose: tuple[float, float, float]) -> None:
         x, y, yaw = pose
@@ -134,18 +139,42 @@ class MujocoRover:
                 highest.append(np.max(ground + np.sqrt(radius**2 - ahead**2) - pz))
         return float(np.max(highest))
 
+    def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with speed servos."""
+        if self.rover.steering is None:
+            speeds = speed + yaw_rate * self._arms
+        else:
+            speeds = self.steer((speed, yaw_rate))
+        self._note(self.servo(speeds / self.rover.wheel.radius, duration), duration)
+
+    def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
+        """Apply torques (6,) [N m] for a duration [s]; speed and yaw rate set the steering.
+
+        With fixed wheels the torques also steer.
+        """
+        self.steer(command)
+        self.step(torques, duration)
+        self._note(torques, duration)
+
+    def brake(self, duration: float) -> None:
+        """Lock the wheels for a duration [s] by dry friction at their axles."""
+        wheels, torques = self._velocities[_WHEELS], np.zeros(6)
+        self._model.dof_frictionloss[wheels] = self.rover.weight * self.rover.wheel.radius
+        self.step(torques, duration)
+        self._model.dof_frictionloss[wheels] = 0.0
+        self._integral[:] = 0.0
+        self._note(torques, duration)
+
+    def _note(self, torques: Floats, duration: float) -> None:
+        """Note the torques (6,) [N m] and the mean velocity of the last duration [s]."""
+        moved = (self.position - self._last) / duration
+        self._torques, self._velocity = torques, self._rotation.T @ moved
+        self._last = self.position
+
     def step(self, torques: Floats, duration: float) -> None:
         """Apply torques (6,) [N m] in wheel order for a duration [s]; motor limits apply."""
         for _ in range(max(round(duration / self._model.opt.timestep), 1)):
             self._advance(self._limit(torques))
-
-    def brake(self, duration: float) -> None:
-        """Lock the wheels for a duration [s] by dry friction at their axles."""
-        wheels = self._velocities[_WHEELS]
-        self._model.dof_frictionloss[wheels] = self.rover.weight * self.rover.wheel.radius
-        self.step(np.zeros(6), duration)
-        self._model.dof_frictionloss[wheels] = 0.0
-        self._integral[:] = 0.0
 
     def steer(self, command: tuple[float, float]) -> Floats:
         """Steer towards a speed [m/s] and yaw rate [rad/s]; return the wheels' speeds meanwhile.
@@ -243,11 +272,14 @@ class MujocoRover:
         return float(self._data.time)
 
     @property
+    def position(self) -> Floats:
+        """Place (3,) of the body's origin [m]."""
+        return self._data.qpos[:3].copy()
+
     def pose(self) -> Floats:
-        """Return x, y, z [m] and yaw [rad] (4,) of the body's origin."""
+        """Return x, y [m] and yaw [rad] (3,) of the body's origin."""
         R = self._rotation
-        yaw = np.arctan2(R[1, 0], R[0, 0])
-        return np.array([*self._data.qpos[:3], yaw])
+        return np.array([*self._data.qpos[:2], np.arctan2(R[1, 0], R[0, 0])])
 
     @property
     def orientation(self) -> Floats:
@@ -304,6 +336,19 @@ class MujocoRover:
     def tilt(self) -> float:
         """Angle between body z and the vertical [rad]."""
         return float(np.arccos(np.clip(self._rotation[2, 2], -1.0, 1.0)))
+
+    def state(self) -> PlantState:
+        """Return the current measurements; velocity and torques are those of the last drive."""
+        return PlantState(
+            position=self.position,
+            orientation=self.orientation,
+            velocity=self._velocity,
+            body_rates=self.body_rates,
+            joint_positions=self.joint_positions,
+            joint_velocities=self.joint_velocities,
+            wheel_torques=self._torques,
+            stopped="the rover has tipped over" if self.tilt > MAX_TILT else self.refusal,
+        )
 
     def measure_contacts(self) -> WheelContacts:
         """Measure forces and slip of all wheels."""

@@ -9,10 +9,12 @@ clearance apply in both cases. A brake locks the wheels. Wheels that steer turn 
 rover file; `SteeredDrive` says how the drive waits for them.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from rover_physics.forces.soil import coulomb_slip
-from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.packed_model import pack_model
@@ -74,7 +76,7 @@ class QuasiStaticPlant:
             SoilError: No soil of that name.
         """
         self._rover, self._terrain = rover, terrain
-        self._friction, self._policy, self._soil = friction, policy, soil
+        self._options = SweepOptions(friction=friction, policy=policy, soil=soil)
         self._writer = BalanceWriter(rover)
         self._mass = self._writer.weight / rover.gravity
         self._drive, self._course = SteeredDrive(rover), WheelCourse(rover)
@@ -219,7 +221,8 @@ class QuasiStaticPlant:
         if self._stalled < PATIENCE or self._stopped:
             return
         if forces.sliding.any():
-            self._stopped = f"wheels slip and the rover stays: {forces.name_sliding()}"
+            slipping = ", ".join(np.array(WHEELS)[forces.sliding])
+            self._stopped = f"wheels slip and the rover stays: {slipping}"
         else:
             self._stopped = "motors saturate and the rover stays"
 
@@ -255,7 +258,7 @@ class QuasiStaticPlant:
             self._stopped = reason
             self._stand(duration)
             return
-        self._before, self._here = self._here, _last_row(moved)
+        self._before, self._here = self._here, moved.select(slice(-1, None))
         self._pose, self._moved, self._angles = there, motion, angles
         self._duration = duration
         moved_by = self._here.wheel_centres[0] - self._before.wheel_centres[0]
@@ -286,8 +289,7 @@ class QuasiStaticPlant:
 
     def _predict(self, poses: Floats, angles: Floats, pulled: bool = False) -> PathPrediction:
         """Return the model's prediction at poses (n, 3); if `pulled`, with optimal torques."""
-        policy = OPTIMAL if pulled else self._policy
-        options = SweepOptions(friction=self._friction, policy=policy, soil=self._soil)
+        options = replace(self._options, policy=OPTIMAL) if pulled else self._options
         model = pack_model(self._rover, self._terrain, options)
         return predict_steered(model, poses, self._motion, angles)
 
@@ -342,11 +344,6 @@ class QuasiStaticPlant:
             wheel_torques=self._torques.copy(),
             stopped=self._stopped,
         )
-
-
-def _last_row(prediction: PathPrediction) -> PathPrediction:
-    """Return a prediction that has only the last waypoint."""
-    return prediction.select(slice(-1, None))
 
 
 def _suspension(prediction: PathPrediction) -> Floats:

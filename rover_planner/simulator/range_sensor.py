@@ -12,82 +12,86 @@ RAYS = 1440
 """Directions of the occlusion test: every quarter degree."""
 
 
-class RangeSensor:
-    """A sensor with the properties that the parameters `sensor_...` name."""
+def look(
+    asked: RoverSimulatorParameters,
+    terrain: Terrain,
+    position: Floats,
+    yaw: float,
+    rng: np.random.Generator,
+) -> Terrain:
+    """Return the terrain around the rover with noise; cells out of sight are unknown.
 
-    def __init__(self, parameters: RoverSimulatorParameters):
-        """Take the parameters of a simulator."""
-        self._parameters = parameters
+    Args:
+        asked: The parameters `sensor_...` name the sensor's properties.
+        terrain: The true ground.
+        position: (3,) body origin [m].
+        yaw: Heading [rad].
+        rng: Random generator of the noise.
 
-    def look(
-        self, terrain: Terrain, position: Floats, rng: np.random.Generator, yaw: float = 0.0
-    ) -> Terrain:
-        """Return the terrain around the rover with noise; cells out of sight are unknown.
+    Raises:
+        TerrainError: No cell is in sight.
+    """
+    noise = asked.sensor_noise
+    rows, columns = _find_window(asked.sensor_range, terrain, position)
+    x0 = terrain.origin[0] + terrain.resolution * columns.start
+    y0 = terrain.origin[1] + terrain.resolution * rows.start
+    heights = terrain.elevation[rows, columns].copy()
+    y, x = np.indices(heights.shape)
+    dx = x0 + terrain.resolution * x - position[0]
+    dy = y0 + terrain.resolution * y - position[1]
+    away = np.hypot(dx, dy)
+    bearing = np.arctan2(dy, dx)
+    seen = (away <= asked.sensor_range) & (away >= asked.sensor_least_range)
+    if asked.sensor_field_of_view < ALL_AROUND:
+        aside = np.abs((bearing - yaw + np.pi) % (2.0 * np.pi) - np.pi)
+        seen &= aside <= 0.5 * asked.sensor_field_of_view
+    if asked.sensor_occlusion:
+        seen &= _find_visible(asked, terrain, position, heights, away, bearing)
+    heights[~seen] = np.nan
+    std = None
+    if noise > 0.0:
+        heights += rng.normal(0.0, noise, heights.shape)
+        std = np.where(seen, noise, np.nan)
+    friction = None if terrain.friction is None else terrain.friction[rows, columns]
+    return Terrain(heights, terrain.resolution, (x0, y0), friction, elevation_std=std)
 
-        Args:
-            terrain: The true ground.
-            position: (3,) body origin [m].
-            rng: Random generator of the noise.
-            yaw: Heading [rad].
 
-        Raises:
-            TerrainError: No cell is in sight.
-        """
-        asked, noise = self._parameters, self._parameters.sensor_noise
-        rows, columns = self._window(terrain, position)
-        x0 = terrain.origin[0] + terrain.resolution * columns.start
-        y0 = terrain.origin[1] + terrain.resolution * rows.start
-        heights = terrain.elevation[rows, columns].copy()
-        y, x = np.indices(heights.shape)
-        dx = x0 + terrain.resolution * x - position[0]
-        dy = y0 + terrain.resolution * y - position[1]
-        away = np.hypot(dx, dy)
-        bearing = np.arctan2(dy, dx)
-        seen = (away <= asked.sensor_range) & (away >= asked.sensor_least_range)
-        if asked.sensor_field_of_view < ALL_AROUND:
-            aside = np.abs((bearing - yaw + np.pi) % (2.0 * np.pi) - np.pi)
-            seen &= aside <= 0.5 * asked.sensor_field_of_view
-        if asked.sensor_occlusion:
-            seen &= self._in_sight(terrain, position, heights, away, bearing)
-        heights[~seen] = np.nan
-        std = None
-        if noise > 0.0:
-            heights += rng.normal(0.0, noise, heights.shape)
-            std = np.where(seen, noise, np.nan)
-        friction = None if terrain.friction is None else terrain.friction[rows, columns]
-        return Terrain(heights, terrain.resolution, (x0, y0), friction, elevation_std=std)
+def _find_window(reach: float, terrain: Terrain, position: Floats) -> tuple[slice, slice]:
+    """Return rows and columns of the cells within reach [m] of a position."""
+    ny, nx = terrain.elevation.shape
+    cells = int(np.ceil(reach / terrain.resolution))
+    column, row = (round((position[k] - terrain.origin[k]) / terrain.resolution) for k in (0, 1))
+    return (
+        slice(max(row - cells, 0), min(row + cells + 1, ny)),
+        slice(max(column - cells, 0), min(column + cells + 1, nx)),
+    )
 
-    def _window(self, terrain: Terrain, position: Floats) -> tuple[slice, slice]:
-        ny, nx = terrain.elevation.shape
-        cells = int(np.ceil(self._parameters.sensor_range / terrain.resolution))
-        column, row = (
-            round((position[k] - terrain.origin[k]) / terrain.resolution) for k in (0, 1)
-        )
-        return (
-            slice(max(row - cells, 0), min(row + cells + 1, ny)),
-            slice(max(column - cells, 0), min(column + cells + 1, nx)),
-        )
 
-    def _in_sight(
-        self, terrain: Terrain, position: Floats, heights: Floats, away: Floats, bearing: Floats
-    ) -> NDArray[np.bool_]:
-        """Return a mask of the cells that no nearer cell on the same ray hides."""
-        eye = position[2] + self._parameters.sensor_height
-        ranges = np.arange(
-            terrain.resolution,
-            self._parameters.sensor_range + terrain.resolution,
-            terrain.resolution,
-        )
-        angles = (np.arange(RAYS) + 0.5) * (2.0 * np.pi / RAYS) - np.pi
-        px = position[0] + ranges * np.cos(angles)[:, None]
-        py = position[1] + ranges * np.sin(angles)[:, None]
-        slopes = (terrain.elevation_at(px, py) - eye) / ranges
-        highest = np.maximum.accumulate(np.where(np.isnan(slopes), -np.inf, slopes), axis=1)
-        before = np.hstack([np.full((RAYS, 1), -np.inf), highest[:, :-1]])
-        ray = np.clip(((bearing + np.pi) / (2.0 * np.pi) * RAYS).astype(int), 0, RAYS - 1)
-        step = np.clip((away / terrain.resolution).astype(int) - 1, 0, len(ranges) - 1)
-        near = away < 1.5 * terrain.resolution
-        own = (heights - eye) / np.maximum(away, 1e-9)
-        # Occlusion by less than the size of a cell is ignored.
-        allowance = 0.5 * terrain.resolution / np.maximum(away, terrain.resolution)
-        return np.asarray(near | (own >= before[ray, step] - allowance))
+def _find_visible(
+    asked: RoverSimulatorParameters,
+    terrain: Terrain,
+    position: Floats,
+    heights: Floats,
+    away: Floats,
+    bearing: Floats,
+) -> NDArray[np.bool_]:
+    """Return a mask of the cells that no nearer cell on the same ray hides."""
+    eye = position[2] + asked.sensor_height
+    ranges = np.arange(
+        terrain.resolution,
+        asked.sensor_range + terrain.resolution,
+        terrain.resolution,
+    )
+    angles = (np.arange(RAYS) + 0.5) * (2.0 * np.pi / RAYS) - np.pi
+    px = position[0] + ranges * np.cos(angles)[:, None]
+    py = position[1] + ranges * np.sin(angles)[:, None]
+    slopes = (terrain.elevation_at(px, py) - eye) / ranges
+    highest = np.maximum.accumulate(np.where(np.isnan(slopes), -np.inf, slopes), axis=1)
+    before = np.hstack([np.full((RAYS, 1), -np.inf), highest[:, :-1]])
+    ray = np.clip(((bearing + np.pi) / (2.0 * np.pi) * RAYS).astype(int), 0, RAYS - 1)
+    step = np.clip((away / terrain.resolution).astype(int) - 1, 0, len(ranges) - 1)
+    near = away < 1.5 * terrain.resolution
+    own = (heights - eye) / np.maximum(away, 1e-9)
+    # Occlusion by less than the size of a cell is ignored.
+    allowance = 0.5 * terrain.resolution / np.maximum(away, terrain.resolution)
+    return np.asarray(near | (own >= before[ray, step] - allowance))

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The simulation without ROS: drives a plant along a path, by speeds or by torques."""
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -10,7 +8,6 @@ import numpy as np
 from rover_physics.names import EQUAL
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
@@ -18,14 +15,14 @@ from rover_planner.parameters.rover_simulator import MUJOCO, RoverSimulatorParam
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from rover_planner.simulator.range_sensor import RangeSensor
+from rover_planner.simulator.range_sensor import look
 from rover_planner.simulator.second_try import MAX_TRIES, STUCK_TIME, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 if TYPE_CHECKING:
-    from rover_planner.simulator.mujoco_plant import MujocoPlant
+    from rover_planner.simulator.mujoco_rover import MujocoRover
 
-Plant: TypeAlias = "QuasiStaticPlant | MujocoPlant"
+Plant: TypeAlias = "QuasiStaticPlant | MujocoRover"
 """A simulated rover; all have the same methods."""
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
 """Width and cell size of the generated terrain [m], the default terrain."""
@@ -33,57 +30,28 @@ WIDEST_GAP = 1e6
 """Width up to which unknown regions are ground like that around them [m]: any width."""
 
 
-@dataclass(frozen=True)
-class SimulationSettings:
-    """The parameters of a simulator, loaded and ready to use."""
-
-    rover: Rover
-    """The rover that is simulated."""
-    terrain: Terrain
-    """The true ground, as far as a sensor can see it."""
-    parameters: RoverSimulatorParameters
-    """The parameters; empty texts and 0 stand for "as rover and terrain say"."""
-
-    @cached_property
-    def ground(self) -> Terrain:
-        """The true ground with the gaps that a server may interpolate: there is ground there."""
-        return self.terrain.fill_gaps(WIDEST_GAP)
-
-    @property
-    def start(self) -> tuple[float, float, float]:
-        """x, y [m] and yaw [rad] of the body origin at the start."""
-        return self.parameters.start_x, self.parameters.start_y, self.parameters.start_yaw
-
-    @property
-    def speed(self) -> float:
-        """Speed along a path [m/s]."""
-        return self.parameters.speed or self.rover.nominal_speed
-
-
-def load_simulation_settings(parameters: RoverSimulatorParameters) -> SimulationSettings:
-    """Load the rover and load or generate the terrain of the parameters.
+def load_ground(parameters: RoverSimulatorParameters) -> Terrain:
+    """Load or generate the terrain of the parameters.
 
     Raises:
-        RoverError: Rover or terrain cannot be loaded.
+        RoverError: It cannot be loaded.
     """
-    rover = load_rover(parameters.rover)
     if parameters.terrain_file:
-        terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
-    else:
-        terrain = make_mars_terrain(parameters.seed, MADE_SIZE, MADE_RESOLUTION)
-    return SimulationSettings(rover, terrain, parameters)
+        return load_terrain(parameters.terrain_file, parameters.max_map_cells)
+    return make_mars_terrain(parameters.seed, MADE_SIZE, MADE_RESOLUTION)
 
 
-def make_plant(settings: SimulationSettings) -> Plant:
-    """Make the plant that the settings name.
+def _make_plant(rover: Rover, terrain: Terrain, asked: RoverSimulatorParameters) -> Plant:
+    """Make the plant that the parameters name.
 
     Raises:
         PlanningError: MuJoCo is selected but not installed, a setting is not supported by it, or
             the rover cannot stand at the start.
         SoilError: No soil of that name.
     """
-    asked = settings.parameters
-    placed = settings.rover, settings.ground, settings.start, asked.friction or None
+    ground = terrain.fill_gaps(WIDEST_GAP)  # in gaps that a server may interpolate, too
+    start = asked.start_x, asked.start_y, asked.start_yaw
+    placed = rover, ground, start, asked.friction or None
     if asked.engine != MUJOCO:
         return QuasiStaticPlant(*placed, asked.policy, asked.soil or None)
     if asked.soil:
@@ -94,27 +62,31 @@ def make_plant(settings: SimulationSettings) -> Plant:
             "servos hold speeds"
         )
     try:
-        from rover_planner.simulator.mujoco_plant import MujocoPlant
+        from rover_planner.simulator.mujoco_rover import MujocoRover
     except ImportError:
         raise PlanningError(
             "engine is mujoco, which is not installed: pip install 'rover_planner[bench]'"
         ) from None
-    return MujocoPlant(*placed)
+    return MujocoRover(*placed)
 
 
 class Simulation:
     """One simulated rover and its last commands."""
 
-    def __init__(self, settings: SimulationSettings):
-        """Place the rover at its start.
+    def __init__(self, rover: Rover, terrain: Terrain, parameters: RoverSimulatorParameters):
+        """Place a rover at its start.
+
+        Args:
+            rover: The rover.
+            terrain: The true ground, as far as a sensor can see it.
+            parameters: The parameters; empty texts and 0 stand for "as rover and terrain say".
 
         Raises:
-            PlanningError, SoilError: As in `make_plant`.
+            PlanningError, SoilError: As in `_make_plant`.
         """
-        self.settings, asked = settings, settings.parameters
-        self.plant = make_plant(settings)
-        self._sensor = RangeSensor(asked)
-        self._rng = np.random.default_rng(asked.seed)
+        self.rover, self.terrain, self._parameters = rover, terrain, parameters
+        self.plant = _make_plant(rover, terrain, parameters)
+        self._rng = np.random.default_rng(parameters.seed)
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
@@ -130,9 +102,9 @@ class Simulation:
 
         A rover that a controller's torques drive tries again where it stands still.
         """
-        rover = self.settings.rover
+        rover = self.rover
         follower = PathFollower(poses, 0.5 * rover.wheelbase, swing_radius(rover))
-        tries = MAX_TRIES if self.settings.parameters.follow_commands else 1
+        tries = MAX_TRIES if self._parameters.follow_commands else 1
         steering = rover.steering
         # From one limit to the other, while the rover stands.
         longest = 0.0 if steering is None else 2.0 * steering.limit / steering.rate
@@ -157,12 +129,12 @@ class Simulation:
 
     def _may_drive(self, now: float) -> bool:
         """Return whether the watch of the path, if there is to be one, lets the rover drive."""
-        timeout = self.settings.parameters.stop_timeout or np.inf
+        timeout = self._parameters.stop_timeout or np.inf
         return not self._stops and now - self._stop_at <= timeout
 
     def has_speeds(self, now: float) -> bool:
         """Return whether commanded speeds apply: they are recent and no path is followed."""
-        return self._follower is None and now - self._wanted_at <= self.settings.parameters.timeout
+        return self._follower is None and now - self._wanted_at <= self._parameters.timeout
 
     @property
     def follows_path(self) -> bool:
@@ -175,8 +147,8 @@ class Simulation:
             self.steering = self._steer(now)
         else:  # no time passes for the follower, which knows no reason to stand but being stuck
             self.steering, self._held = (0.0, 0.0), self._held + duration
-        if self.settings.parameters.follow_commands:
-            fresh = now - self._torques_at <= self.settings.parameters.timeout
+        if self._parameters.follow_commands:
+            fresh = now - self._torques_at <= self._parameters.timeout
             if fresh and not self._brakes:
                 self.plant.pull(self._torques, self.steering, duration)
             else:  # drives without commands are off, and braked
@@ -188,7 +160,8 @@ class Simulation:
     def _steer(self, now: float) -> tuple[float, float]:
         if self._follower is not None:
             pose = self.plant.pose()
-            wanted = self._follower.steer(pose, self.settings.speed, now - self._held)
+            speed = self._parameters.speed or self.rover.nominal_speed
+            wanted = self._follower.steer(pose, speed, now - self._held)
             if self._follower.has_arrived(pose):
                 self._follower, self.at_end = None, True
             return wanted
@@ -201,4 +174,4 @@ class Simulation:
             position: (3,) body origin [m].
             yaw: Heading [rad].
         """
-        return self._sensor.look(self.settings.terrain, position, self._rng, yaw)
+        return look(self._parameters, self.terrain, position, yaw, self._rng)

@@ -44,8 +44,8 @@ def evaluate(study: Study, rover: Rover) -> tuple[float, str]:
         reason = why_not_climbed(rover, taller, study.policy, study.friction)
         return height, f"{taller:.3f} m: {reason}"
     if study.objective == "load_imbalance":
-        shares = load_shares(rover)
-        return float(shares.max() / shares.mean()), ""
+        loads = level_loads(rover)
+        return float(loads.max() / loads.mean()), ""
     scores = [_score_drive(study, rover, k) for k in range(len(study.drives))]
     failed = [score for score in scores if not np.isfinite(score[0])]
     if failed:
@@ -54,10 +54,9 @@ def evaluate(study: Study, rover: Rover) -> tuple[float, str]:
     return choose(scores, key=operator.itemgetter(0))
 
 
-def load_shares(rover: Rover) -> Floats:
-    """Return the shares (6,) of the weight on the wheels, at rest on level ground."""
-    loads = judge_poses(rover, step_ground(rover, 0.0), np.zeros((1, 3)))[0].wheel_loads[0]
-    return np.asarray(loads / loads.sum())
+def level_loads(rover: Rover) -> Floats:
+    """Return the loads (6,) of the wheels at rest on level ground [N]."""
+    return judge_poses(rover, step_ground(rover, 0.0), np.zeros((1, 3)))[0].wheel_loads[0]
 
 
 def _score_drive(study: Study, rover: Rover, k: int) -> tuple[float, str]:

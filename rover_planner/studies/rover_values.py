@@ -15,6 +15,7 @@ import yaml
 from rover_physics.errors import RoverFileError
 from rover_physics.files.validation import Key, describe, errors_of, find_unit
 from rover_physics.files.yaml_file import parse_yaml
+from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 
@@ -52,11 +53,11 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
         now = get_value(data, key)
         return _make_value((key,), f"{label} [{unit}]", now, 0.2 * now, max(2.5 * now, top))
 
-    names = ("rear", "middle", "front")
     height = length("wheels z", "suspension", "wheels", "rear", 2, within=1.5 * radius)
-    all_wheels = tuple(("suspension", "wheels", name, 2) for name in names)
+    all_wheels = tuple(("suspension", "wheels", name, 2) for name in WHEEL_POSITIONS)
     wheels = [
-        length(f"{name} wheel x", "suspension", "wheels", name, 0, within=span) for name in names
+        length(f"{name} wheel x", "suspension", "wheels", name, 0, within=span)
+        for name in WHEEL_POSITIONS
     ]
     values = {
         "Ground and drive": [

@@ -5,7 +5,7 @@ import contextlib
 import csv
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
-from rover_planner.studies.objectives import evaluate, load_shares
+from rover_planner.studies.objectives import evaluate, level_loads
 from rover_planner.studies.rover_values import vary
 from rover_planner.studies.study_file import OBJECTIVES, Study, label_of, name_thing
 
@@ -134,29 +134,28 @@ def run_study(study: Study, on_trial: Callable[[Trial], None] | None = None) -> 
     return StudyResult(study, baseline, tuple(trials))
 
 
-def find_rover(study: Study, trial: Trial) -> Rover:
-    """Return the rover of a trial.
+def find_rover(study: Study, values: tuple[float, ...]) -> Rover:
+    """Return the rover with values of the parameters, in their order.
 
     Raises:
         RoverFileError, ModelError: It is invalid.
     """
     numbers = {
         key: value
-        for parameter, value in zip(study.parameters, trial.values, strict=True)
+        for parameter, value in zip(study.parameters, values, strict=True)
         for key in parameter.keys
     }
     return vary(study.rover, numbers)
 
 
 def _try(study: Study, values: tuple[float, ...]) -> Trial:
-    trial = Trial(values, float("nan"), "")
     try:
-        rover = find_rover(study, trial)
-        shares = tuple(load_shares(rover).tolist())
+        rover = find_rover(study, values)
+        loads = level_loads(rover)
         objective, note = evaluate(study, rover)
     except (RoverFileError, ModelError) as error:
-        return replace(trial, note=str(error))
-    return Trial(values, objective, note, shares)
+        return Trial(values, float("nan"), str(error))
+    return Trial(values, objective, note, tuple((loads / loads.sum()).tolist()))
 
 
 class _EnoughError(Exception):

@@ -3,10 +3,10 @@
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
@@ -243,24 +243,19 @@ def _find_parameters(
     """Return the parameters with their keys in the rover file; check that none is varied twice."""
     contents, found, taken = rover_to_dict(rover), [], set[Key]()
     for k, entry in enumerate(entries):
-        parameter = _find_parameter(entry, contents, f"parameters[{k}]")
-        if taken & {*parameter.keys}:
-            must = "a number that no other parameter varies"
-            raise refuse(f"parameters[{k}].name", entry.name, must)
-        taken |= {*parameter.keys}
-        found.append(parameter)
+        at = f"parameters[{k}]"
+        if not entry.low < entry.high:
+            raise refuse(f"{at}.to", entry.high, f"above from, {entry.low:g}")
+        numbers = [find_key(contents, name) for name in (entry.name, *entry.also)]
+        keys, (unit, *others) = zip(*numbers, strict=True)
+        if {*others} - {unit}:
+            raise refuse(f"{at}.also", entry.also, f"names of numbers in {unit or 'no unit'}")
+        if taken & {*keys}:
+            raise refuse(f"{at}.name", entry.name, "a number that no other parameter varies")
+        taken |= {*keys}
+        now = get_value(contents, keys[0])
+        found.append(StudyParameter(**vars(entry), keys=keys, unit=unit, now=now))
     return tuple(found)
-
-
-def _find_parameter(entry: ParameterEntry, contents: Mapping[str, Any], at: str) -> StudyParameter:
-    if not entry.low < entry.high:
-        raise refuse(f"{at}.to", entry.high, f"above from, {entry.low:g}")
-    key, unit = find_key(contents, entry.name)
-    others = [find_key(contents, name) for name in entry.also]
-    if any(own_unit != unit for _, own_unit in others):
-        raise refuse(f"{at}.also", entry.also, f"names of numbers in {unit or 'no unit'}")
-    keys = (key, *(other for other, _ in others))
-    return StudyParameter(**vars(entry), keys=keys, unit=unit, now=get_value(contents, key))
 
 
 def _beside(name: str, folder: Path) -> str:

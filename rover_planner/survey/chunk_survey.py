@@ -40,8 +40,6 @@ class SurveyJob:
 class ChunkReport:
     """The report of a task on its chunk."""
 
-    chunk: Index
-    """Row and column of the chunk."""
     poses: int = 0
     """Number of poses."""
     refusal: str = ""
@@ -74,8 +72,8 @@ def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
     except OSError as error:
         if not is_refusal(error):
             raise
-        return ChunkReport(chunk, refusal=error.strerror or str(error))
-    return ChunkReport(chunk, poses)
+        return ChunkReport(refusal=error.strerror or str(error))
+    return ChunkReport(poses)
 
 
 def compute_chunk(

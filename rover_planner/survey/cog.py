@@ -5,7 +5,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from rover_physics.files.validation import show_file
+from rover_physics.files.user_file import writing
+from rover_physics.files.validation import errors_of, show_file
 from rover_planner.errors import PlanningError
 from rover_planner.survey.geotiff import BAND, import_rasterio
 from rover_planner.survey.map_source import MapFrame
@@ -55,11 +56,10 @@ def _replace(path: Path, content: memoryview) -> None:
     """Write a file, or leave what is there where the system refuses."""
     aside = path.with_name(f".{path.name}.new")
     try:
-        aside.write_bytes(content)
-        force_to_disk(aside, path.parent)
-        aside.replace(path)
-    except OSError as error:
-        raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+        with errors_of(path, PlanningError), writing():
+            aside.write_bytes(content)
+            force_to_disk(aside, path.parent)
+            aside.replace(path)
     finally:
         aside.unlink(missing_ok=True)
 
@@ -71,7 +71,7 @@ def write_layers(store: SurveyStore, folder: Path) -> None:
         PlanningError: A file cannot be written.
     """
     make_folder(folder)
-    for name in store.layer_names():
+    for name in store.notes.layers:
         write_cog(
             folder / f"{name}.tif", store.layer(name), store.notes.frame, store.notes.layout.step
         )

@@ -59,10 +59,10 @@ class ClusterSettings:
 
 
 def check_settings(settings: ClusterSettings) -> None:
-    """Check the settings of a cluster, and that its scheduler is there, before anything is done.
+    """Check the settings of a cluster before anything is done.
 
     Raises:
-        PlanningError: A setting is invalid, or there is no such scheduler.
+        PlanningError: A setting is invalid.
     """
     if settings.memory_limit is not None and settings.memory_size <= 0:
         raise PlanningError(
@@ -80,8 +80,6 @@ def check_settings(settings: ClusterSettings) -> None:
             f"scheduler is {settings.scheduler!r}; it must be an address such as "
             "tcp://10.0.0.1:8786"
         )
-    with open_client(settings):
-        pass
 
 
 @contextlib.contextmanager

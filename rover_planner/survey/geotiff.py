@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -51,22 +51,20 @@ class GeoTiffMap:
 
     path: Path
     """The file."""
+    soil_names: ClassVar[tuple[str, ...]] = ()
+    """A GeoTIFF has no soils."""
 
     @property
     def frame(self) -> MapFrame:
         """Place and size of its cells."""
         with self._open() as file:
-            self._check(file)
+            if wrong := find_missing_block(file, self.path) or _find_fault(file):
+                raise PlanningError(f"{show_file(self.path)}: {wrong}")
             resolution = float(file.transform.a)
             x = file.transform.c + 0.5 * resolution
             y = file.transform.f + (0.5 - file.height) * resolution
             crs = file.crs.to_wkt()
             return MapFrame((file.height, file.width), resolution, (x, y), crs)
-
-    @property
-    def soil_names(self) -> tuple[str, ...]:
-        """A GeoTIFF has no soils."""
-        return ()
 
     def read(self, box: Box, every: int = 1) -> Grids:
         """Return the heights in a box of cells, every so many cells of them; NaN for nodata.
@@ -137,12 +135,6 @@ class GeoTiffMap:
                     f"{show_file(self.path)}: holds {value:.17g} and declares no nodata value; "
                     f"gdal_edit.py -a_nodata {value:.17g} declares it"
                 )
-
-    def _check(self, file: Any) -> None:
-        """Check kind, units and completeness of an open file."""
-        wrong = find_missing_block(file, self.path) or _find_fault(file)
-        if wrong:
-            raise PlanningError(f"{show_file(self.path)}: {wrong}")
 
 
 def import_rasterio() -> Any:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from rover_physics.traversability.classification import IMPASSABLE, TRAVERSABILITY_CLASSES
 from rover_physics.traversability.verdict import codes_of_verdicts
+from rover_planner.survey.layout import Index
 
 NOT_SURVEYED = 255
 """Class and limit of a cell that is not surveyed yet, or whose chunk failed."""
@@ -23,7 +24,8 @@ CLASS_COLOURS = ("#009E73", "#56B4E9", "#E69F00", "#D55E00", "#F0E442")
 """The palette of Okabe and Ito (2008), by number."""
 UNKNOWN_LABEL = "unknown ground, edge, or not surveyed"
 """Name of what has no class."""
-
+MAX_DRAWN = 1200
+"""Most cells along a side that are drawn; of more, every second, third, ..."""
 
 QUANTITIES = {
     "friction_utilisation": (0, True),
@@ -41,16 +43,17 @@ def number_limits() -> dict[str, int]:
     return {"": NO_LIMIT} | {code: 1 + k for k, code in enumerate(codes_of_verdicts())}
 
 
-def count_skipped(store: Any, most: int) -> int:
-    """Return of how many cells along a side of a survey one is drawn, for at most `most`."""
-    return max(1, -(-max(store.notes.layout.shape) // most))
+def count_skipped(shape: Index) -> int:
+    """Return of how many cells along a side of a grid one is drawn."""
+    return max(1, -(-max(shape) // MAX_DRAWN))
 
 
-def read_drawn_classes(store: Any, every: int) -> NDArray:
-    """Return the numbers of the worst classes of every few cells of a survey, as they are drawn.
+def read_drawn_classes(store: Any) -> NDArray:
+    """Return the numbers of the worst classes of the drawn cells of a survey.
 
     SOME_HEADINGS where the heading decides, NOT_SURVEYED also where the ground is unknown.
     """
+    every = count_skipped(store.notes.layout.shape)
     worst, best, first = (
         np.asarray(store.layer(name)[::every, ::every])
         for name in ("worst_class", "best_class", "first_limit")
@@ -65,8 +68,7 @@ def read_drawn_classes(store: Any, every: int) -> NDArray:
 
 def bits_type(headings: int) -> np.dtype:
     """Return the smallest unsigned type with a bit for each heading."""
-    bits = next(bits for bits in (8, 16, 32, 64) if bits >= headings)
-    return np.dtype(f"u{bits // 8}")
+    return np.min_scalar_type((1 << headings) - 1)
 
 
 def list_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.number]:
@@ -94,8 +96,7 @@ def pack_bits(passes: NDArray[np.bool_]) -> NDArray:
     """Return flags (..., headings) as whole numbers (...), heading k in bit k."""
     headings = passes.shape[-1]
     kind = bits_type(headings)
-    bits = kind.type(1) << np.arange(headings).astype(kind)
-    return np.asarray(np.bitwise_or.reduce(np.where(passes, bits, kind.type(0)), axis=-1))
+    return np.asarray(passes @ (kind.type(1) << np.arange(headings, dtype=kind)))
 
 
 def unpack_bits(bits: NDArray, headings: int) -> NDArray[np.bool_]:

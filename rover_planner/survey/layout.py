@@ -88,12 +88,13 @@ def find_halo(rover: Rover, resolution: float) -> int:
     return -(-cells // BLOCK) * BLOCK
 
 
-def choose_chunk(map_shape: Index, step: int, headings: int) -> int:
-    """Return the default side of a chunk [surveyed cells], a multiple of a tile."""
-    tile = max(1, TILE // step)
-    cells = math.prod(-(-size // step) for size in map_shape)
-    side = math.sqrt(max(CHUNK_POSES / headings, cells / MAX_CHUNKS))
-    return max(1, round(side / tile)) * tile
+def choose_chunk(map_shape: Index, step: int, headings: int, least: int | None = None) -> int:
+    """Return the side of a chunk [surveyed cells]: whole tiles, from `least` on or the default."""
+    layout = SurveyLayout(map_shape, step, 1, 0)
+    if least is not None:
+        return math.ceil(least / layout.tile) * layout.tile
+    side = math.sqrt(max(CHUNK_POSES / headings, math.prod(layout.shape) / MAX_CHUNKS))
+    return max(1, round(side / layout.tile)) * layout.tile
 
 
 def _cut(at: Index, side: int, shape: Index) -> Box:

@@ -2,7 +2,6 @@
 """Maps that are read by windows: those kept in a store, and GeoTIFF files."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,25 +37,18 @@ class MapFrame(NamedTuple):
 class StoredMap:
     """A map that is kept in the store of its survey."""
 
-    store: Path
-    """Folder of the store."""
+    group: Any
+    """Group of the store that holds it."""
 
     @property
     def soil_names(self) -> tuple[str, ...]:
         """Names of the soils that the layer soil points to."""
-        notes: Any = self._group().attrs
-        return tuple(notes["soil_names"])
+        return tuple(self.group.attrs["soil_names"])
 
     def read(self, box: Box, every: int = 1) -> Grids:
         """Return the layers in a box of cells, every so many cells of them."""
-        group = self._group()
         thin = tuple(slice(span.start, span.stop, every) for span in box)
-        return {name: group[name][thin] for name in GRIDS if name in group}
-
-    def _group(self) -> Any:
-        import zarr
-
-        return zarr.open_group(self.store, mode="r", path=MAP)
+        return {name: self.group[name][thin] for name in GRIDS if name in self.group}
 
 
 def keep_map(group: Any, terrain: Terrain) -> None:
@@ -67,10 +59,4 @@ def keep_map(group: Any, terrain: Terrain) -> None:
         if grid is not None:
             chunks = tuple(min(MAP_CHUNK, size) for size in grid.shape)
             kept.create_array(name, data=grid, chunks=chunks)
-    kept.attrs.update(
-        {
-            "resolution": terrain.resolution,
-            "origin": list(terrain.origin),
-            "soil_names": list(terrain.soil_names),
-        }
-    )
+    kept.attrs["soil_names"] = list(terrain.soil_names)

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The question of a survey: rover, options, headings and distance of cells."""
 
-import hashlib
-import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -10,6 +8,7 @@ import numpy as np
 
 import rover_physics
 from rover_physics.bounds.path import SIGMAS, check_sigmas
+from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
@@ -62,10 +61,4 @@ class SurveyRequest:
         Args:
             map_hash: Hash of the map's content.
         """
-        asked: dict[str, Any] = json.loads(json.dumps(asdict(self)))
-        return asked | {"map": map_hash, "version": rover_physics.__version__}
-
-
-def hash_of(description: dict[str, Any]) -> str:
-    """Return the hash of a description of a survey."""
-    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()[:16]
+        return to_plain(asdict(self)) | {"map": map_hash, "version": rover_physics.__version__}

@@ -30,9 +30,6 @@ KEPT = "finished chunks are kept, and the same command goes on with the others"
 GONE = f"the scheduler is gone; {KEPT}"
 ALONE = f"the cluster has no worker any more; {KEPT}"
 
-Task = Callable[[SurveyJob, Index], ChunkReport]
-"""Work of a task."""
-
 
 @dataclass
 class SurveyOutcome:
@@ -51,7 +48,7 @@ def run_survey(
     chunks: Iterable[Index],
     settings: ClusterSettings,
     on_chunk: Callable[[ChunkReport], object] = lambda report: None,
-    task: Task = survey_chunk,
+    task: Callable[[SurveyJob, Index], ChunkReport] = survey_chunk,
 ) -> SurveyOutcome:
     """Survey chunks on a cluster.
 
@@ -63,7 +60,7 @@ def run_survey(
         task: Work of a task.
 
     Returns:
-        What became of them. Chunks that failed are marked in the store.
+        What became of them.
 
     Raises:
         PlanningError: No such scheduler, too little memory, no worker is left, or the store cannot
@@ -71,12 +68,12 @@ def run_survey(
     """
     from distributed.comm import CommClosedError
 
-    store = SurveyStore(job.store)
-    check_machine(store.notes, settings)
+    notes = SurveyStore(job.store).notes
+    check_machine(notes, settings)
     try:
         with open_client(settings) as client:
             wait_for_workers(client)
-            return _Run(job, store, client, iter(chunks), on_chunk, task).run()
+            return _Run(job, notes, client, iter(chunks), on_chunk, task).run()
     except CommClosedError:
         raise PlanningError(GONE) from None
 
@@ -84,8 +81,8 @@ def run_survey(
 class _Run:
     """The chunks of a run: those to come, those under way, and what became of the others."""
 
-    def __init__(self, job, store, client, chunks, on_chunk, task):
-        self._job, self._store = job, store
+    def __init__(self, job, notes, client, chunks, on_chunk, task):
+        self._job, self._notes = job, notes
         self._client, self._chunks = client, chunks
         self._on_chunk, self._task = on_chunk, task
         self._outcome = SurveyOutcome()
@@ -100,24 +97,18 @@ class _Run:
         self._fill(under_way)
         for future in under_way:
             chunk = self._chunk_of.pop(future.key)
-            if future.status == "finished":
-                self._take(future.result())
-            elif future.status != "error":
+            if future.status not in ("finished", "error"):
                 raise PlanningError(GONE)
-            elif _is_killed(future.exception()):
+            if _is_killed(future.exception()):
                 suspects.append(chunk)
             else:
-                self._give_up(chunk, future.exception())
+                self._settle(chunk, future)
             future.release()
             self._fill(under_way)
         for chunk in suspects:
             # Alone, so that a chunk is not blamed for another with which its worker died.
             future = self._submit(chunk, "alone")
-            error = future.exception()  # waits for the end
-            if error is None:
-                self._take(future.result())
-            else:
-                self._give_up(chunk, error)
+            self._settle(chunk, future)
             future.release()
         return self._outcome
 
@@ -129,7 +120,7 @@ class _Run:
             new, self._workers = threads.keys() - self._workers, frozenset(threads)
             if new:
                 check_workers(self._job, self._client, sorted(new))
-                check_memory(self._store.notes, self._client)
+                check_memory(self._notes, self._client)
             self._count_again = time.monotonic() + COUNT_PERIOD
         free = max(AHEAD * self._threads - len(self._chunk_of), 0)
         for chunk in itertools.islice(self._chunks, free):
@@ -144,23 +135,24 @@ class _Run:
             self._task, self._job, chunk, key=key, pure=False, retries=ATTEMPTS - 1
         )
 
-    def _take(self, report: ChunkReport) -> None:
-        if report.refusal:
-            raise PlanningError(f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}")
-        self._outcome.done += 1
-        self._outcome.poses += report.poses
-        self._on_chunk(report)
+    def _settle(self, chunk: Index, future: Any) -> None:
+        """Note what became of a chunk; raise PlanningError if the others will fail as it did."""
+        error = future.exception()  # waits for the end
+        if error is None:
+            report = future.result()
+            if report.refusal:
+                told = f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}"
+                raise PlanningError(told)
+            self._outcome.done += 1
+            self._outcome.poses += report.poses
+            self._on_chunk(report)
+        elif type(error).__name__ in ("NoWorkerError", "NoValidWorkerError"):
+            raise PlanningError(ALONE)
+        elif _is_killed(error):
+            self._outcome.failed[chunk] = f"its worker died {ATTEMPTS} times"
+        else:
+            self._outcome.failed[chunk] = f"{type(error).__name__}: {error}"
 
-    def _give_up(self, chunk: Index, error: BaseException) -> None:
-        """Mark a chunk as failed; raise PlanningError if the others will fail as it did."""
-        if type(error).__name__ in ("NoWorkerError", "NoValidWorkerError"):
-            raise PlanningError(ALONE) from None
-        why = f"{type(error).__name__}: {error}"
-        self._outcome.failed[chunk] = (
-            f"its worker died {ATTEMPTS} times" if _is_killed(error) else why
-        )
-        self._store.mark_failed(chunk)
 
-
-def _is_killed(error: BaseException) -> bool:
+def _is_killed(error: BaseException | None) -> bool:
     return type(error).__name__ == "KilledWorker"

@@ -14,31 +14,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.files.validation import show_file
+from rover_physics.files.user_file import writing
+from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.survey.geotiff import GeoTiffMap
-from rover_planner.survey.layers import (
-    CLASS_NUMBERS,
-    NOT_SURVEYED,
-    list_layers,
-    number_limits,
-)
+from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED, list_layers, number_limits
 from rover_planner.survey.layout import Index, SurveyLayout
-from rover_planner.survey.map_source import MapFrame, StoredMap, keep_map
-from rover_planner.survey.request import hash_of
+from rover_planner.survey.map_source import MAP, MapFrame, StoredMap, keep_map
 
 FORMAT = 2
 """Version of the store's format: 2 writes all files of a chunk, also those without values."""
 NOTES = "rover_planner_survey"
 """Attribute of the store with all that is known of its survey."""
 SECONDS = "seconds"
-"""Array (rows, columns) of chunks: time that a chunk took [s]; NaN while it is not finished,
-FAILED if it failed. Each element is a file, written last."""
+"""Array (rows, columns) of chunks: time that a chunk took [s]; NaN while it is not finished. Each
+element is a file, written last."""
 WRITERS = 8
 """Number of layers that are written at a time."""
-FAILED = -1.0
-"""Seconds of a chunk that failed."""
 UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError)
 """Errors of Zarr and its codecs where a file is damaged or gone."""
 
@@ -77,7 +70,6 @@ class StoreNotes:
         layout, frame = self.layout, self.frame
         return {
             "format": FORMAT,
-            "hash": hash_of(self.description),
             "description": self.description,
             "map_shape": list(layout.map_shape),
             "chunk": layout.chunk,
@@ -162,23 +154,13 @@ class SurveyStore:
                 f"{show_file(path)} is not a survey: {type(error).__name__}; "
                 "name another folder, or remove it"
             ) from None
-        for name in (*self.layer_names(), SECONDS):
-            self._check_array(name)
-
-    def _check_array(self, name: str) -> None:
-        """Check that an array is there, as it was made.
-
-        Raises:
-            PlanningError: It is not.
-        """
         layout = self.notes.layout
-        shape = layout.chunks if name == SECONDS else layout.shape
-        try:
-            found = self._group[name].shape
-        except KeyError as error:
-            raise _damaged(self.path, name, error) from None
-        if found != shape:
-            raise _damaged(self.path, name, ValueError(f"{found} cells, not {shape}"))
+        for name in (*self.notes.layers, SECONDS):
+            shape = layout.chunks if name == SECONDS else layout.shape
+            if name not in self._group:
+                raise _damaged(path, name, KeyError(name))
+            if (found := self._group[name].shape) != shape:
+                raise _damaged(path, name, ValueError(f"{found} cells, not {shape}"))
 
     def check(self, description: Mapping[str, Any], chunk: int | None) -> None:
         """Check that the store is of the survey that is asked for.
@@ -203,7 +185,7 @@ class SurveyStore:
     def find_finished(self) -> set[Index]:
         """Return the chunks that are finished, and of which no file was lost since."""
         rows, columns = np.nonzero(self.layer(SECONDS)[:] >= 0.0)
-        layers = [self.layer(name) for name in self.layer_names()]
+        layers = [self.layer(name) for name in self.notes.layers]
         return {
             chunk
             for chunk in zip(rows.tolist(), columns.tolist(), strict=True)
@@ -232,21 +214,13 @@ class SurveyStore:
         with ThreadPoolExecutor(WRITERS) as writers:  # the disk takes many files at a time
             for _ in writers.map(put, layers):
                 pass
-        self._group[SECONDS][chunk] = max(seconds, 0.0)
+        self._group[SECONDS][chunk] = seconds
         force_to_disk(self.layer(SECONDS).file_of(chunk), self.path)
-
-    def mark_failed(self, chunk: Index) -> None:
-        """Write that a chunk failed."""
-        self._group[SECONDS][chunk] = FAILED
 
     def open_map(self) -> GeoTiffMap | StoredMap:
         """Return the map: the GeoTIFF that the notes name, or, if they name none, the kept one."""
         file = self.notes.map_file
-        return GeoTiffMap(Path(file)) if file else StoredMap(self.path)
-
-    def layer_names(self) -> list[str]:
-        """Return the names of the layers."""
-        return list(self.notes.layers)
+        return GeoTiffMap(Path(file)) if file else StoredMap(self._group[MAP])
 
     def layer(self, name: str) -> KeptLayer:
         """Return a layer (rows, columns)."""
@@ -261,12 +235,8 @@ class SurveyStore:
         """
         import fcntl
 
-        try:
+        with errors_of(self.path, PlanningError), writing():
             lock = (self.path / ".lock").open("w")
-        except OSError as error:
-            raise PlanningError(
-                f"{show_file(self.path)}: cannot be written: {error.strerror}"
-            ) from None
         with lock as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -295,31 +265,30 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     aside = path.with_name(f"{path.name}.{os.getpid()}.new")
     layout = notes.layout
     try:
-        group: Any = zarr.open_group(aside, mode="w")
-        side = min(layout.chunk, max(layout.shape))
-        for name, value in notes.layers.items():
+        with errors_of(path, PlanningError), writing():
+            group: Any = zarr.open_group(aside, mode="w")
+            side = min(layout.chunk, max(layout.shape))
+            for name, value in notes.layers.items():
+                group.create_array(
+                    name,
+                    shape=layout.shape,
+                    chunks=(side, side),
+                    dtype=value.dtype,
+                    fill_value=value.item(),
+                )
             group.create_array(
-                name,
-                shape=layout.shape,
-                chunks=(side, side),
-                dtype=value.dtype,
-                fill_value=value.item(),
+                SECONDS, shape=layout.chunks, chunks=(1, 1), dtype="f4", fill_value=float("nan")
             )
-        group.create_array(
-            SECONDS, shape=layout.chunks, chunks=(1, 1), dtype="f4", fill_value=float("nan")
-        )
-        if terrain is not None:
-            keep_map(group, terrain)
-        group.attrs[NOTES] = notes.to_dict()
-        os.sync()
-        try:
-            aside.rename(path)
-        except OSError as error:
-            if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
-                raise
-        force_to_disk(path.parent, path.parent)
-    except OSError as error:
-        raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+            if terrain is not None:
+                keep_map(group, terrain)
+            group.attrs[NOTES] = notes.to_dict()
+            os.sync()
+            try:
+                aside.rename(path)
+            except OSError as error:
+                if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+                    raise
+            force_to_disk(path.parent, path.parent)
     finally:  # also after Ctrl-C
         shutil.rmtree(aside, ignore_errors=True)
 

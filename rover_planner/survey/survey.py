@@ -13,15 +13,12 @@ from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob
 from rover_planner.survey.dask_cluster import ClusterSettings, check_machine
-from rover_planner.survey.geotiff import GeoTiffMap, is_geotiff
+from rover_planner.survey.geotiff import BAND, GeoTiffMap, is_geotiff
 from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
 from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import StoreNotes, SurveyStore, create_store
-
-BAND = 1024
-"""Rows that are read at a time."""
 
 
 @dataclass(frozen=True)
@@ -114,12 +111,9 @@ def _make_notes(
     request: SurveyRequest, frame: MapFrame, map_file: str, content: str, chunk: int | None
 ) -> StoreNotes:
     """Return the notes of a new store."""
-    side = choose_chunk(frame.shape, request.step, request.headings)
+    if chunk is not None and chunk < 1:
+        raise PlanningError(f"chunk is {chunk}; it must be 1 or more surveyed cells")
+    side = choose_chunk(frame.shape, request.step, request.headings, chunk)
     halo = find_halo(request.rover, frame.resolution)
-    if chunk is not None:
-        if chunk < 1:
-            raise PlanningError(f"chunk is {chunk}; it must be 1 or more surveyed cells")
-        tile = SurveyLayout(frame.shape, request.step, side, halo).tile
-        side = -(-chunk // tile) * tile
     layout = SurveyLayout(frame.shape, request.step, side, halo)
     return StoreNotes(request.describe(content), layout, frame, map_file)

@@ -34,8 +34,6 @@ BATCH = 4096
 """Approximate number of poses whose results are in memory at a time."""
 STRAIGHT, ON_THE_SPOT = 0.0, np.inf
 """Curvatures [1/m]."""
-Outline = tuple[float, float, float, float]
-"""Rear, front, right and left edge [m], body frame."""
 
 
 def survey_tile(
@@ -84,8 +82,11 @@ def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     return layers
 
 
-def outline_of(rover: Rover) -> Outline:
-    """Return the rectangle that holds wheels and belly, seen from above on flat ground."""
+def outline_of(rover: Rover) -> tuple[float, float, float, float]:
+    """Return the rectangle that holds wheels and belly, seen from above on flat ground.
+
+    These are its rear, front, right and left edge [m], body frame.
+    """
     wheel, belly = rover.wheel, rover.belly
     xs = [x for x, _, _ in rover.suspension.wheels.values()]
     side = max(y for _, y, _ in rover.suspension.wheels.values()) + 0.5 * wheel.width
@@ -101,10 +102,9 @@ class TileJudge:
     """Judges poses on the ground of a tile."""
 
     def __init__(self, request: SurveyRequest, terrain: Terrain):
-        self._request, self._terrain = request, terrain
-        self._rover, self._policy = request.rover, request.options.policy
-        self._has_gaps = bool(np.isnan(terrain.elevation).any())
+        self._request, self._terrain, self._rover = request, terrain, request.rover
         self._on_map = RoverOnMap(self._rover, terrain, request.options, request.sigmas)
+        self._model = pack_model(self._rover, terrain, request.options)
         self._numbers = number_limits()
 
     @quiet
@@ -114,9 +114,11 @@ class TileJudge:
         grid = np.empty((len(places), headings, 3))
         grid[:, :, :2], grid[:, :, 2] = places[:, None], self._request.yaws
         poses = grid.reshape(-1, 3)
-        refused = self._find_unknown_below(poses)
-        results, limits = self.judge(self._policy, poses, STRAIGHT)
-        limits = _refuse_unknown(limits, refused)
+        refused = np.zeros(len(poses), bool)
+        mark_unknown_below(self._model.ground.records, poses, outline_of(self._rover), refused)
+        results, limits = self.judge(poses, STRAIGHT)
+        number = self._numbers["unknown_ground"]
+        limits[refused & ((limits == NO_LIMIT) | (limits > number))] = number
         numbers = find_scores(results).astype(np.float32)
         classes = self._classify(poses, limits, refused)
         layers = _sum_up(numbers, limits, classes, headings)
@@ -130,22 +132,19 @@ class TileJudge:
             )
         return layers
 
-    def judge(self, policy: str, poses: np.ndarray, bend: float) -> tuple[Any, np.ndarray]:
-        """Judge poses under a policy, in a motion of one curvature.
+    def judge(self, poses: np.ndarray, bend: float) -> tuple[Any, np.ndarray]:
+        """Judge poses in a motion of one curvature.
 
         Args:
-            policy: Torque policy.
             poses: (n, 3) x, y [m] and yaw [rad].
             bend: Curvature of the motion [1/m].
 
         Returns:
             RESULTs (n,), and the number (n,) of the first limit that fails, NO_LIMIT if none.
         """
-        options = replace(self._request.options, policy=policy)
-        model = pack_model(self._rover, self._terrain, options)
         bends = np.full(len(poses), bend)
-        results = model.evaluate(poses, motions=motions_of(model, poses, bends))
-        codes = find_codes(model.limits, results)
+        results = self._model.evaluate(poses, motions=motions_of(self._model, poses, bends))
+        codes = find_codes(self._model.limits, results)
         limits = np.array([self._numbers[code] for code in codes], np.uint8)
         if self._on_map.is_uncertain:
             rows = np.flatnonzero(limits == NO_LIMIT)
@@ -155,7 +154,7 @@ class TileJudge:
                     self._terrain,
                     poses[rows],
                     bends[rows],
-                    options,
+                    self._request.options,
                     sigmas=self._request.sigmas,
                 )
                 limits[rows] = [self._numbers[code] for code in verdict.codes]
@@ -163,7 +162,7 @@ class TileJudge:
 
     def _classify(self, poses: np.ndarray, limits: np.ndarray, refused: np.ndarray) -> np.ndarray:
         """Return the class (n,) of poses whose limits under the asked policy are known."""
-        own = TORQUE_POLICIES.index(self._policy)
+        own = TORQUE_POLICIES.index(self._request.options.policy)
         worst = CLASS_NUMBERS[IMPASSABLE]
         classes = np.where(limits == NO_LIMIT, own, worst).astype(np.uint8)
         hopeless = [self._numbers[code] for code in hopeless_codes(self._on_map.is_uncertain)]
@@ -186,7 +185,7 @@ class TileJudge:
         for bend in (ON_THE_SPOT, -ON_THE_SPOT):
             rows = np.flatnonzero(turns)
             if len(rows):
-                turns[rows] = self.judge(self._policy, poses[rows], bend)[1] == NO_LIMIT
+                turns[rows] = self.judge(poses[rows], bend)[1] == NO_LIMIT
         return turns
 
     def _find_chances(self, poses: np.ndarray, passes: np.ndarray) -> np.ndarray:
@@ -196,21 +195,6 @@ class TileJudge:
             asked = self._rover, self._terrain, poses[rows], None, self._request.options
             chances[rows] = judge_poses(*asked, sigmas=0, accepted_chance=1.0)[1].failure_chance_at
         return chances
-
-    def _find_unknown_below(self, poses: np.ndarray) -> np.ndarray:
-        """Return (n,) whether unknown ground is below the rover, seen from above."""
-        unknown = np.zeros(len(poses), bool)
-        if self._has_gaps:
-            model = pack_model(self._rover, self._terrain, self._request.options)
-            mark_unknown_below(model.ground.records, poses, outline_of(self._rover), unknown)
-        return unknown
-
-
-def _refuse_unknown(limits: np.ndarray, refused: np.ndarray) -> np.ndarray:
-    """Return the limits with unknown ground where it comes first."""
-    number = number_limits()["unknown_ground"]
-    later = (limits == NO_LIMIT) | (limits > number)
-    return np.where(refused & later, np.uint8(number), limits)
 
 
 def _sum_up(

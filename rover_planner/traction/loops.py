@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Control loops around the torque allocation: speed, heading, slip, stall and torque rate."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
@@ -50,7 +50,7 @@ class PIController:
     """PI controller of a speed error, with limited output and anti-windup."""
 
     def __init__(self, gain: float, integral_gain: float, limit: float):
-        """Start with an integral of zero.
+        """Start with an integral part of zero.
 
         Args:
             gain: Output per error.
@@ -58,20 +58,12 @@ class PIController:
             limit: Largest magnitude of the output, and of its integral part.
         """
         self._gain, self._integral_gain, self._limit = gain, integral_gain, limit
-        self._integral = 0.0
+        self.start()
 
-    def reset(self) -> None:
-        """Set the integral to zero."""
-        self._integral = 0.0
-
-    @property
-    def integral(self) -> float:
-        """The integral part of the output; one from another controller makes a smooth change."""
-        return self._integral
-
-    @integral.setter
-    def integral(self, integral: float) -> None:
-        self._integral = self._clip(integral)
+    def start(self, integral: float = 0.0) -> None:
+        """Start with an integral part; that of another controller makes a smooth change."""
+        self.integral = self._clip(integral)
+        """The integral part of the output."""
 
     def update(self, error: float, duration: float, limited: bool) -> float:
         """Return the output.
@@ -83,9 +75,9 @@ class PIController:
                 grow.
         """
         step = self._integral_gain * error * duration
-        if not (limited and step * self._integral > 0.0):
-            self._integral = self._clip(self._integral + step)
-        return self._clip(self._gain * error + self._integral)
+        if not (limited and step * self.integral > 0.0):
+            self.integral = self._clip(self.integral + step)
+        return self._clip(self._gain * error + self.integral)
 
     def _clip(self, output: float) -> float:
         return min(max(output, -self._limit), self._limit)
@@ -99,14 +91,9 @@ class PushLoop(PIController):
     largest push that the wheels can give without slip is found by trying.
     """
 
-    def __init__(self, gain: float, integral_gain: float, limit: float):
-        """Start with an integral of zero and the largest push, `limit` [N]."""
-        super().__init__(gain, integral_gain, limit)
-        self._allowed, self._cut = limit, False
-
-    def reset(self) -> None:
-        """Set the integral to zero and allow the largest push again."""
-        super().reset()
+    def start(self, integral: float = 0.0) -> None:
+        """Start with an integral part [N], and allow the largest push."""
+        super().start(integral)
         self._allowed, self._cut = self._limit, False
 
     def push(self, error: float, duration: float, limited: bool, peak: float) -> float:
@@ -139,9 +126,9 @@ class WheelRates:
     """(4,) angles of rockers and bogies [rad]."""
     wanted: float
     """Wanted mean rate [rad/s]."""
-    from_map: bool = False
+    from_map: bool
     """True if the ratios come from a map; from motion they may miss a face."""
-    level_ratios: Floats = field(default_factory=lambda: np.ones(WHEEL_COUNT))
+    level_ratios: Floats
     """(6,) speeds of the wheels over their mean on level ground, 1 straight ahead."""
 
 
@@ -228,10 +215,6 @@ class SlipControl:
         self.detector = StallDetector()
         """Tells whether the rover is stalled or climbs."""
 
-    def reset(self) -> None:
-        """Start as for a rover that moves."""
-        self.detector = StallDetector()
-
     def correct(self, torques: Floats, motion: WheelRates, duration: float) -> Floats:
         """Return torques (6,) [N m] with slip control.
 
@@ -298,10 +281,6 @@ class StallWatch:
         """Start with a rover that moves."""
         self._time = 0.0
         self._blocked = NOT_BLOCKED
-
-    def reset(self) -> None:
-        """Forget the stall."""
-        self._time, self._blocked = 0.0, NOT_BLOCKED
 
     def reset_time(self) -> None:
         """Start to count anew, for a rover that climbs."""

@@ -20,6 +20,7 @@ class TractionStatistics:
         self._period = period
         self._last_start: float | None = None
         self._times: deque[float] = deque(maxlen=MAX_TIMES)
+        """Durations of the last updates, including publishing [s]."""
         self.missed = 0
         """Cycles without an update because an update came late."""
         self.fallbacks = 0
@@ -28,11 +29,6 @@ class TractionStatistics:
         """Updates in all."""
         self.last: TractionCommand | None = None
         """The last one."""
-
-    @property
-    def times(self) -> np.ndarray:
-        """Durations of the last updates, including publishing [s]."""
-        return np.array(self._times)
 
     def take(self, update: TractionCommand, start: float, end: float) -> None:
         """Count an update that lasted from start to end [s]."""
@@ -52,7 +48,7 @@ class TractionStatistics:
             "fallbacks": self.fallbacks,
         }
         if self._times:
-            median, p99 = (1e3 * np.quantile(self.times, (0.5, 0.99))).round(3).tolist()
+            median, p99 = (1e3 * np.quantile(self._times, (0.5, 0.99))).round(3).tolist()
             values |= {"update_time_median_ms": median, "update_time_p99_ms": p99}
         return values if self.last is None else values | _describe_update(self.last)
 

@@ -42,30 +42,6 @@ HOLD_ANGLE_GAIN = 25.0
 """Angular deceleration per angle turned of the hold servos [1/s^2]."""
 
 
-class DrivePermission:
-    """Keeps enabling and emergency stop; the stop also takes the enabling away."""
-
-    def __init__(self, enabled: bool):
-        """Start enabled or not, without an emergency stop."""
-        self.enabled = enabled
-        """True if an operator has enabled the rover."""
-        self.emergency_stop = False
-        """True if the emergency stop is pressed."""
-
-    def set_enabled(self, enabled: bool) -> tuple[bool, str]:
-        """Enable or disable; return whether that was done, and what holds now."""
-        if enabled and self.emergency_stop:
-            return False, "not enabled: ~/emergency_stop is true; it must be false first"
-        self.enabled = enabled
-        return True, "enabled" if enabled else "disabled"
-
-    def take_emergency_stop(self, pressed: bool) -> None:
-        """Take the emergency stop: pressed, or released, which does not enable again."""
-        self.emergency_stop = pressed
-        if pressed:
-            self.enabled = False
-
-
 class TractionSupervisor:
     """Passes on the torques of a TractionService while the rover may drive, else those of rest."""
 
@@ -73,8 +49,10 @@ class TractionSupervisor:
         """Start at rest; `enabled` is the permission to drive once all inputs are there."""
         self.service = TractionService(settings)
         """Keeps measurements and allocates torques."""
-        self.permission = DrivePermission(enabled)
-        """Enabling and emergency stop."""
+        self.enabled = enabled
+        """True if an operator has enabled the rover, and no emergency stop was pressed since."""
+        self.emergency_stop = False
+        """True if the emergency stop is pressed."""
         self._hold = self._create_hold()
         self._fault, self._fault_end = "", -math.inf
         self._stall = StallWatch()
@@ -96,6 +74,18 @@ class TractionSupervisor:
         inertia = weight / rover.gravity * rover.wheel.radius**2 / WHEEL_COUNT
         most = self.service.settings.max_torque
         return WheelServos(HOLD_RATE_GAIN * inertia, HOLD_ANGLE_GAIN * inertia, most)
+
+    def set_enabled(self, enabled: bool) -> tuple[bool, str]:
+        """Enable or disable; return whether that was done, and what holds now."""
+        if enabled and self.emergency_stop:
+            return False, "not enabled: ~/emergency_stop is true; it must be false first"
+        self.enabled = enabled
+        return True, "enabled" if enabled else "disabled"
+
+    def take_emergency_stop(self, pressed: bool) -> None:
+        """Take the emergency stop: pressed, or released, which does not enable again."""
+        self.emergency_stop = pressed
+        self.enabled = self.enabled and not pressed
 
     def trip(self, fault: str) -> None:
         """Take a fault that was found elsewhere into the next update."""
@@ -142,12 +132,9 @@ class TractionSupervisor:
 
     def _find_state(self, fault: str, duration: float) -> str:
         """Return the state; the first of STATES that applies."""
-        if self.permission.emergency_stop:
-            self._stall.reset()
-            return EMERGENCY_STOP
-        if not self.permission.enabled:
-            self._stall.reset()
-            return DISABLED
+        if not self.enabled:
+            self._stall = StallWatch()
+            return EMERGENCY_STOP if self.emergency_stop else DISABLED
         if fault:
             return FAULT
         if self._is_stalled(duration):
@@ -156,7 +143,7 @@ class TractionSupervisor:
 
     def _is_stalled(self, duration: float) -> bool:
         if not any(self.service.wanted):
-            self._stall.reset()
+            self._stall = StallWatch()
             return False
         if self.service.climbs:
             self._stall.reset_time()

@@ -40,6 +40,7 @@ from rover_planner.traction.loops import (
     PIController,
     PushLoop,
     SlipControl,
+    StallDetector,
     WheelRates,
     limit_rate,
 )
@@ -116,7 +117,8 @@ class TractionService:
         integrals = self._speed.integral, self._heading.integral
         self._create_loops()
         if settings.rover is last.rover:
-            self._speed.integral, self._heading.integral = integrals
+            self._speed.start(integrals[0])
+            self._heading.start(integrals[1])
             return
         self._estimator = MotionContactEstimator(settings.rover)
         self._follow_steering(settings)
@@ -286,7 +288,7 @@ class TractionService:
         self._last_time = now
         level = self._measure_state(level_estimate())
         if not self.course.take(self._writer.find_rolling(level), self.steering):
-            self._speed.reset()
+            self._speed.start()
         estimate, warning = self._estimate_contacts(now, duration)
         state = self._measure_state(estimate)
         push = self._find_push(duration)
@@ -314,9 +316,9 @@ class TractionService:
 
     def _reset(self) -> None:
         """Discard the last answer and set all integrals to zero."""
-        self._speed.reset()
-        self._heading.reset()
-        self._slip.reset()
+        self._speed.start()
+        self._heading.start()
+        self._slip.detector = StallDetector()
         self._last_time = None
         self._last = None
         self._limited, self._peak = False, 0.0

@@ -28,15 +28,11 @@ class Watchdog:
         self._lock = threading.Lock()
         self._deadline = float("inf")
         self._acted_at = float("-inf")
-        self._trips = 0
+        self.trips = 0
+        """Number of times that commands expired."""
         self._ending = False
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self._thread.start()
-
-    @property
-    def trips(self) -> int:
-        """Number of times that commands expired."""
-        return self._trips
 
     def send(self, command: Callable[[], None], started: float, deadline: float) -> bool:
         """Send a command that is valid until a deadline.
@@ -77,7 +73,7 @@ class Watchdog:
             try:
                 if time.monotonic() >= self._deadline:
                     self._acted_at = time.monotonic()
-                    self._trips += not tripped
+                    self.trips += not tripped
                     tripped = True
                     self._act()
             except Exception:

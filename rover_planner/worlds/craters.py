@@ -62,15 +62,10 @@ def sample_diameters(
         Diameters (n,) [m], largest first; n is Poisson distributed.
 
     Raises:
-        PlanningError: A negative density, one of more than MAX_COUNT craters, or diameters that
-            are not 0 < smallest < largest.
+        PlanningError: A negative density, or one of more than MAX_COUNT craters.
     """
     if not 0 <= density < np.inf:
         raise PlanningError(f"crater density is {density!r} 1/m^2; it must not be negative")
-    if not 0 < smallest < largest < np.inf:
-        raise PlanningError(
-            f"crater diameters are {smallest!r} to {largest!r} m; they must be above 0 and ascend"
-        )
     most, least = smallest**-NUMBER_EXPONENT, largest**-NUMBER_EXPONENT
     expected = density * area * (most - least)
     if expected > MAX_COUNT:

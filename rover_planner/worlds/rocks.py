@@ -62,15 +62,10 @@ def sample_diameters(
         Diameters (n,) [m]; n is Poisson distributed about the number that the law expects.
 
     Raises:
-        PlanningError: k outside 0 to 1, more than MAX_COUNT rocks, or diameters that are not
-            0 < smallest < largest.
+        PlanningError: k outside 0 to 1, or more than MAX_COUNT rocks.
     """
     if not 0 <= k < 1:
         raise PlanningError(f"rock cover is {k!r}; it is a fraction of the ground, 0 to 1")
-    if not 0 < smallest < largest < np.inf:
-        raise PlanningError(
-            f"rock diameters are {smallest!r} to {largest!r} m; they must be above 0 and ascend"
-        )
     if k == 0:
         return np.zeros(0)
     sizes = np.geomspace(smallest, largest, 512)

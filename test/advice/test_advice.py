@@ -168,8 +168,9 @@ def test_a_use_of_servos_tells_how_far_away_a_failure_is():
     """Servos use all friction on a slope, and may lift a wheel, without failing."""
     judged = refused_by(slope, policy="servo").judge()
     assert judged.passes
-    assert judged.nearest_limit == "tilt"
-    assert judged.largest_use[0] == pytest.approx(np.arctan(0.3) / LSR1.limits.tilt, rel=0.02)
+    use, _, limit = judged.largest_use
+    assert limit == "tilt"
+    assert use == pytest.approx(np.arctan(0.3) / LSR1.limits.tilt, rel=0.02)
 
 
 def test_a_piece_fails_only_where_the_path_does():

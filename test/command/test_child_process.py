@@ -75,7 +75,7 @@ def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environmen
     ("number", "code"),
     [
         (signal.SIGINT, -signal.SIGINT),
-        (signal.SIGTERM, 128 + signal.SIGTERM),
+        (signal.SIGTERM, -signal.SIGINT),
         (signal.SIGKILL, -signal.SIGKILL),
     ],
 )

@@ -51,12 +51,12 @@ def test_wheels_that_roll_because_they_are_steered_do_not_slip():
 
 def test_ground_is_marked_where_wheels_have_been():
     learner = learn(climb(ROVER, SLOPE, 20.0)[::5])
-    known = np.isfinite(learner.layers.friction)
+    known = np.isfinite(learner.layers[0])
     x, y = ramp(SLOPE).origin
     rows, columns = np.nonzero(known)
     assert known.any() and np.abs(y + 0.04 * rows).min() > 0.2
     assert np.abs(x + 0.04 * columns).max() < 1.4
-    assert (learner.layers.friction_std[known] > 0.0).all()
+    assert (learner.layers[1][known] > 0.0).all()
 
 
 def test_wheels_that_slip_on_one_class_of_ground_tell_all_of_it_and_nothing_of_another():
@@ -71,13 +71,14 @@ def test_wheels_that_slip_on_one_class_of_ground_tell_all_of_it_and_nothing_of_a
     slick, other = learner.estimate.classes[7], learner.estimate.classes[4]
     assert slick.low < SLOPE < slick.high
     assert other.high is None and other.mean > 0.7
-    layers, been = learner.layers, np.isfinite(learner.ground.visited.friction)
+    (friction, std), felt = learner.layers, learner.ground.visited[0]
+    been = np.isfinite(felt)
     far = (classes == 7.0) & ~been
-    assert been.any() and (layers.friction[far] == slick.mean).all()
-    assert (layers.friction_std[far] == slick.std).all()
-    assert np.isnan(layers.friction[(classes == 4.0) & ~been]).all()
-    assert np.isnan(layers.friction[y > 1.0]).all()
-    np.testing.assert_array_equal(layers.friction[been], learner.ground.visited.friction[been])
+    assert been.any() and (friction[far] == slick.mean).all()
+    assert (std[far] == slick.std).all()
+    assert np.isnan(friction[(classes == 4.0) & ~been]).all()
+    assert np.isnan(friction[y > 1.0]).all()
+    np.testing.assert_array_equal(friction[been], felt[been])
 
 
 def test_a_torque_that_fluctuates_tells_the_friction_of_a_wheel_that_slips_less_surely():
@@ -177,9 +178,9 @@ def test_slip_is_seen_without_any_torque_and_measures_nothing():
 
 def drive_up(friction: float, degrees: float, seconds: float) -> np.ndarray:
     """Return rows of a drive up a slope in MuJoCo by speed servos, from just before it."""
-    simulator = pytest.importorskip("rover_planner.simulator.mujoco_plant")
+    simulator = pytest.importorskip("rover_planner.simulator.mujoco_rover")
     ground, rows = drive_ground("slope", degrees), []
-    plant = simulator.MujocoPlant(ROVER, ground, (-0.5, 0.0, 0.0), friction)
+    plant = simulator.MujocoRover(ROVER, ground, (-0.5, 0.0, 0.0), friction)
     for time in np.arange(0.0, seconds, 0.02):
         plant.drive(SPEED, 0.0, 0.02)
         rows.append(row_of_plant(plant, time))

@@ -12,7 +12,7 @@ from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, MERGE
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.simulator.simulation import Simulation, SimulationSettings
+from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, waves
 from support.rovers import LSR1
 from support.services import make_service
@@ -36,7 +36,7 @@ class Drive:
 
     def __init__(self, **parameters):
         simulated = RoverSimulatorParameters(start_x=START[0], speed=0.08, **CAMERA)
-        self.simulation = Simulation(SimulationSettings(LSR1, make_terrain(waves), simulated))
+        self.simulation = Simulation(LSR1, make_terrain(waves), simulated)
         self.service = make_service(map_updates=MERGE, planner=FAN, **parameters)
         self.keeper = MapKeeper(LSR1, self.service.settings.parameters)
         self.time = 0.0

@@ -119,7 +119,7 @@ def test_every_pose_is_read_or_refused(numbers):
 
 
 def test_decimation_keeps_the_ends_the_spacing_and_what_it_is_told_to():
-    poses = np.column_stack([np.linspace(0.0, 3.0, 151), np.zeros(151)])
+    poses = np.column_stack([np.linspace(0.0, 3.0, 151), np.zeros((151, 2))])
     rows = decimate(poses, 0.1)
     assert rows[0] == 0 and rows[-1] == 150
     np.testing.assert_allclose(np.diff(poses[rows, 0]), 0.1, atol=1e-12)

@@ -3,7 +3,6 @@
 
 import array
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,11 +13,11 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
 from msg_adapters.joints import JointNames
-from msg_adapters.paths import PoseStock, settled_path
+from msg_adapters.paths import settled_path
 from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
 from msg_adapters.results.markers import IMPASSABLE, PASSABLE, WITH_SPEED_SERVOS, path_markers
 from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
-from rover_physics import PoseStatus, Terrain, judge_path
+from rover_physics import Terrain, judge_path
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
@@ -81,18 +80,6 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
         assert seconds == pytest.approx(prediction.time[i], abs=1e-8)
 
 
-def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(prediction):
-    stock = []
-    for unsettled in (49, 10, 50):
-        cut = np.arange(len(prediction.settled)) < unsettled
-        results = prediction.results.copy()
-        results["status"][~cut] = PoseStatus.NOT_SETTLED
-        part = replace(prediction, results=results)
-        trajectory = joint_trajectory(part, LSR1, HEADER, stock)
-        assert len(trajectory.points) == unsettled
-        assert trajectory == joint_trajectory(part, LSR1, HEADER)
-
-
 def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_rover():
     turned = np.linspace(0.0, 0.5, 30)
     path = arc_of(1.0, turned)
@@ -113,13 +100,6 @@ def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other
     reach = np.hypot([0.4, 0.0, 0.4], 0.31) / LSR1.wheel.radius
     assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)
     assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()
-
-
-def test_a_path_of_poses_filled_anew_is_the_same_as_one_of_new_poses(prediction):
-    stock = PoseStock()
-    for rows in ([0, 10, 49], [5], range(50), [49, 48]):
-        path = settled_path(prediction, rows, HEADER, stock)
-        assert path == settled_path(prediction, rows, HEADER)
 
 
 def test_a_settled_path_has_height_and_full_orientation(prediction):

@@ -24,7 +24,7 @@ from msg_adapters.stamps import ns_to_stamp
 from rover_physics import Terrain, judge_path, load_terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.cli import main
-from rover_planner.nodes.result_topics import RESULT_KINDS
+from rover_planner.nodes.result_topics import RESULTS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_files import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
 from support.messages import grid_map_of, odometry_at, transform_message
@@ -140,7 +140,7 @@ def test_predictions_are_recorded_as_a_server_publishes_them(tmp_path, capsys):
     assert [answer["kind"] for answer in answers] == ["driven", "check_path", "driven"]
     with Reader(tmp_path / "out" / "predictions") as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}
-    assert counts == {f"/traverse_server/{name}": 3 for name in RESULT_KINDS}
+    assert counts == {f"/traverse_server/{name}": 3 for name in RESULTS}
     told = {answer["stamp"]: answer["prediction"] for answer in answers}
     for stamp, loads in published(tmp_path / "out", "wheel_loads", Float64MultiArray):
         file = np.load(tmp_path / "out" / told[f"{stamp // 10**9}.{stamp % 10**9:09d}"])

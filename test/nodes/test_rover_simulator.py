@@ -85,7 +85,7 @@ def test_it_publishes_what_a_rover_would_drives_as_commanded_and_stops_when_comm
     for heard in (ear.joint_states, ear.imu, ear.clouds, ear.diagnostics):
         wait_until(lambda heard=heard: heard, "joint states, attitude, map and diagnostics")
     state, imu = ear.joint_states[-1], ear.imu[-1]
-    rover, plant = simulator.simulation.settings.rover, simulator.simulation.plant
+    rover, plant = simulator.simulation.rover, simulator.simulation.plant
     arm, steering = rover.manipulator.joints, steering_joints(rover)
     assert list(state.name) == [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *steering, *arm]
     assert len(state.position) == len(state.velocity) == len(state.effort) == len(state.name)

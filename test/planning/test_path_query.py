@@ -50,10 +50,16 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
 
 def test_the_safer_path_wins_and_energy_decides_between_equals():
     answer = answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
-    first, second, third = answer.candidates[:3]
-    safe = replace(second, cost=(0.3, 90.0))
-    thrifty = replace(third, cost=(0.3, 80.0))
-    risky = replace(first, cost=(0.5, 10.0))
+    risky, safe, thrifty = (
+        replace(
+            one,
+            prediction=one.prediction.change(energy=np.full(len(one.poses), energy)),
+            verdict=replace(one.verdict, risk=risk),
+        )
+        for one, risk, energy in zip(
+            answer.candidates, (0.5, 0.3, 0.31), (10.0, 90.0, 80.0), strict=False
+        )
+    )
     assert choose((risky, safe, thrifty)).nearest == 2
     refused = replace(thrifty, verdict=replace(thrifty.verdict, traversable=False))
     assert choose((risky, safe, refused)).nearest == 1

@@ -44,7 +44,7 @@ def test_an_optimisation_finds_what_a_sweep_finds_without_ties():
     assert found.ties == () and describe_ties(found) == ""
     keys = [parameter.keys[0] for parameter in found.study.parameters]
     best = vary(found.study.rover, dict(zip(keys, found.best.values, strict=True)))
-    assert find_rover(found.study, found.best) == best
+    assert find_rover(found.study, found.best.values) == best
 
 
 def test_the_tallest_step_is_climbed_and_a_little_more_is_not():

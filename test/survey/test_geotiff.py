@@ -73,7 +73,7 @@ def test_corners_and_projection_come_back(tmp_path):
     prepared = survey_tif(path, make_request(), tmp_path / "out")
     write_layers(prepared.store, tmp_path / "layers")
     with rasterio.open(path) as there:
-        for name in prepared.store.layer_names():
+        for name in prepared.store.notes.layers:
             with rasterio.open(tmp_path / "layers" / f"{name}.tif") as back:
                 assert back.bounds == pytest.approx(there.bounds, abs=1e-9)
                 assert back.transform.almost_equals(there.transform, 1e-9)

@@ -67,7 +67,6 @@ def test_finished_chunks_are_not_done_again_and_half_written_ones_are(surveyed, 
     compute_here(replace(prepared, chunks=prepared.chunks[:4]))
     rows, columns = prepared.store.notes.layout.cells_of(prepared.chunks[4])
     prepared.store._group["worst_tilt"][rows, columns] = 7.0  # it was stopped after this layer
-    prepared.store.mark_failed(prepared.chunks[5])
     left = prepared.store.notes.layout.cells_of(prepared.chunks[6])
     assert (prepared.store.layer("best_class")[left] == 255).all()
     assert np.isnan(prepared.store.layer("worst_tilt")[left]).all()

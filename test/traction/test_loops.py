@@ -17,7 +17,8 @@ from rover_planner.traction.loops import (
 
 def moves(rate, wanted=0.3, suspension=(0.0, 0.0, 0.0, 0.0)):
     """Return wheels that all turn at a rate."""
-    return WheelRates(np.full(6, rate), np.ones(6), np.array(suspension), wanted)
+    rates, ratios = np.full(6, rate), np.ones(6)
+    return WheelRates(rates, ratios, np.array(suspension), wanted, False, ratios)
 
 
 def test_a_push_that_cannot_be_given_does_not_add_up():

@@ -34,7 +34,7 @@ def test_servos_with_droop_drive_a_rover_along_the_curve_of_its_wheels():
         plant.servo_with_droop(aims.speeds / LSR1.wheel.radius, 0.3, 2.0)
     np.testing.assert_allclose(plant.steering_angles, aims.angles, atol=0.01)
     assert plant.body_rates[2] == pytest.approx(CURVATURE * SPEED, rel=0.1)
-    assert plant.pose[3] == pytest.approx(CURVATURE * SPEED * 6.0, rel=0.1)
+    assert plant.pose()[2] == pytest.approx(CURVATURE * SPEED * 6.0, rel=0.1)
 
 
 def test_servos_with_droop_lose_speed_by_their_torque():
@@ -74,7 +74,7 @@ def rest_on_slope(rover: Rover, half: float, policy: str, event: str, seconds: f
     while plant.time < LOST + seconds:
         over = plant.time > LOST
         if ENABLED < plant.time <= LOST:
-            supervisor.permission.set_enabled(True)
+            supervisor.set_enabled(True)
         lost, service, now = event if over else "", supervisor.service, plant.time
         if lost != "wheel rates":
             service.take_joints(plant.joint_positions, plant.joint_velocities, now)
@@ -88,7 +88,7 @@ def rest_on_slope(rover: Rover, half: float, policy: str, event: str, seconds: f
         else:
             plant.step(command.torques, PERIOD)
         if over:
-            places.append(float(plant.pose[0]))
+            places.append(float(plant.pose()[0]))
     return command, (np.array(places) - places[0]) / np.cos(SLOPE)
 
 

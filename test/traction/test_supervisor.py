@@ -44,20 +44,20 @@ class Rig:
 
 def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_enabling():
     rig = Rig(enabled=False)
-    permission = rig.supervisor.permission
+    supervisor = rig.supervisor
     assert rig.run(1.0).state == "disabled"
-    assert permission.set_enabled(True) == (True, "enabled")
+    assert supervisor.set_enabled(True) == (True, "enabled")
     assert rig.run(1.0).state == "driving"
-    permission.take_emergency_stop(True)
+    supervisor.take_emergency_stop(True)
     command = rig.run(PERIOD)
     assert command.state == "emergency_stop" and (command.torques < 0.0).all()
-    done, why = permission.set_enabled(True)
+    done, why = supervisor.set_enabled(True)
     assert not done and "~/emergency_stop" in why
-    permission.take_emergency_stop(False)
+    supervisor.take_emergency_stop(False)
     assert rig.run(1.0).state == "disabled"
-    assert permission.set_enabled(True)[0]
+    assert supervisor.set_enabled(True)[0]
     assert rig.run(PERIOD).state == "driving"
-    assert permission.set_enabled(False) == (True, "disabled")
+    assert supervisor.set_enabled(False) == (True, "disabled")
     assert rig.run(PERIOD).state == "disabled"
 
 
@@ -172,7 +172,7 @@ def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_othe
     assert rig.run(1.0).state == "driving"
     rig.run(2.0)
     for enabled in (False, True):
-        rig.supervisor.permission.set_enabled(enabled)
+        rig.supervisor.set_enabled(enabled)
         assert rig.run(PERIOD).state == ("driving" if enabled else "disabled")
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from rover_planner.errors import PlanningError
 from rover_planner.worlds import craters, rocks
-from rover_planner.worlds.mars_terrain import make_mars_terrain, make_relief
+from rover_planner.worlds.mars_terrain import HURST, make_mars_terrain, make_relief
 
 
 def test_the_same_seed_makes_the_same_terrain_and_another_seed_another():
@@ -27,16 +27,15 @@ def test_more_rocks_do_not_move_the_hills():
     assert difference.max() - np.median(difference) > 0.05
 
 
-@pytest.mark.parametrize("hurst", [0.5, 0.8])
-def test_relief_has_its_hurst_exponent_and_roughness(hurst):
+def test_relief_has_its_hurst_exponent_and_roughness():
     rng = np.random.default_rng(0)
     rms = np.zeros(3)
     for _ in range(4):
-        relief = make_relief(rng, (400, 400), 0.1, hurst, 0.03)
+        relief = make_relief(rng, 400, 0.1, 0.03)
         for k, lag in enumerate((5, 10, 20)):
             rms[k] += np.sqrt(np.mean((relief[:, lag:] - relief[:, :-lag]) ** 2)) / 4
     assert rms[1] == pytest.approx(0.03, rel=0.1)
-    assert np.log2(rms[2] / rms[0]) / 2 == pytest.approx(hurst, abs=0.1)
+    assert np.log2(rms[2] / rms[0]) / 2 == pytest.approx(HURST, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -44,15 +43,11 @@ def test_relief_has_its_hurst_exponent_and_roughness(hurst):
     [
         ({"seed": -1}, "seed"),
         ({"size": 0.0}, "size"),
-        ({"size": "big"}, "size"),
         ({"resolution": 0.0}, "resolution"),
         ({"size": 1e6}, "cells"),
-        ({"hurst": 1.5}, "hurst"),
         ({"roughness": -1.0}, "roughness"),
         ({"crater_density": -1.0}, "crater density"),
-        ({"crater_diameters": (2.0, 1.0)}, "crater diameters"),
         ({"rock_cover": 1.5}, "rock cover"),
-        ({"rock_diameters": (0.0, 1.0)}, "rock diameters"),
     ],
 )
 def test_impossible_terrains_are_refused_by_name(change, names):

@@ -13,7 +13,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
 from std_msgs.msg import Header
 
-from msg_adapters.results.grids import classes_to_grid
+from msg_adapters.results.grids import VALUES, occupancy_grid
 from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
@@ -24,7 +24,6 @@ from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
 from rover_planner.ros.lazy_publisher import LazyPublisher
-from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.node import RoverNode
 
 PERIOD = 0.5
@@ -56,7 +55,6 @@ class HazardTopics:
             give_way: As `QuestionDesk.give_way`: questions come first.
         """
         self._node, self._service, self._give_way = node, service, give_way
-        self._log = TransitionLog(node.get_logger())
         self._shown: _Shown | None = None
         self._done: tuple[Terrain, ServiceSettings] | None = None
         self._topics: dict[str, LazyPublisher] = {}
@@ -70,13 +68,16 @@ class HazardTopics:
         self._thread.start()
 
     def apply(self) -> None:
-        """Follow the parameter `hazard_map`."""
+        """Follow the parameter `hazard_map`; without it the topics do not come into being."""
         if not self._node.values.hazard_map:
             self._enabled.clear()
             self._withdraw()
             return
-        if not self._topics:
-            self._create_topics()
+        headings = (f"heading_{k}" for k in range(self._node.values.hazard_headings))
+        for name in ("worst", "best", *headings):
+            if name not in self._topics:
+                topic = LazyPublisher(self._node, OccupancyGrid, f"~/hazard_map/{name}")
+                self._topics[name] = topic
         self._enabled.set()
 
     def _withdraw(self) -> None:
@@ -88,12 +89,6 @@ class HazardTopics:
         blank = shown.without_classes(self._make_header())
         for name, topic in self._topics.items():
             topic.publish(partial(blank.grid, name))
-
-    def _create_topics(self) -> None:
-        """Create the topics, which a node without a hazard map does not have."""
-        headings = (f"heading_{k}" for k in range(self._node.values.hazard_headings))
-        for name in ("worst", "best", *headings):
-            self._topics[name] = LazyPublisher(self._node, OccupancyGrid, f"~/hazard_map/{name}")
 
     def close(self) -> None:
         """End the thread."""
@@ -137,7 +132,7 @@ class HazardTopics:
             except QuestionStoppedError:
                 return
             except RoverError as error:  # such as a soil of the map that is not known
-                self._log.update("hazards", f"no hazard map: {error}", "", time.monotonic())
+                self._node.get_logger().warning(f"no hazard map: {error}", once=True)
             except Exception as error:
                 self._node.guard.report("hazard map", error)
                 hazards, self._done = HazardMap(self._node.values.hazard_headings), None
@@ -218,4 +213,4 @@ class _Shown:
             classes = view.worst() if name == "worst" else view.best()
         else:
             classes = view.classes[int(name.removeprefix("heading_"))]
-        return classes_to_grid(classes, view.resolution, view.origin, self.header)
+        return occupancy_grid(VALUES[classes], view.resolution, view.origin, self.header)

@@ -37,22 +37,15 @@ from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos
 
 PERIOD = 0.1
-"""Time between two looks while paths are watched, and between two heartbeats [s]."""
+"""Time between two looks while a path is watched, and between two heartbeats [s]."""
 LONGEST_LOOK = 2.0
 """Age of the last look above which there is no heartbeat: the watch has died [s]."""
-IDLE_PERIOD = 1.0
-"""Time between two looks while none is: the suspension is compared for the diagnostics [s]."""
 MAX_POSE_AGE = 0.3
 """Age up to which a pose says where the rover is [s]."""
 NO_PATH = WatchedPath(np.empty((0, 3)))
 """The path that is watched where none is."""
 END_TIME = 2.0
 """Longest wait for the thread at the end [s]."""
-
-FindPose = Callable[[], NDArray[np.float64] | None]
-"""Returns the pose (3,) x, y [m] and yaw [rad] of the body of just now, map frame."""
-ReportStop = Callable[[PathJudgement, str, Snapshot], None]
-"""Publishes why the rover is to stop, with the hash of its path and what was known."""
 
 
 class PathWatch:
@@ -66,16 +59,18 @@ class PathWatch:
         self,
         node: RoverNode[TraverseServerParameters],
         service: TraverseService,
-        find_pose: FindPose,
-        report_stop: ReportStop,
+        find_pose: Callable[[], NDArray[np.float64] | None],
+        report_stop: Callable[[PathJudgement, str, Snapshot], None],
     ):
         """Create topic, service and thread.
 
         Args:
             node: The node.
             service: Knows map, pose and joints.
-            find_pose: Returns where the body is; None if it is not known.
-            report_stop: Called in the executor's thread when the rover is to stop.
+            find_pose: Returns the pose (3,) x, y [m] and yaw [rad] of the body of just now, map
+                frame; None if it is not known.
+            report_stop: Publishes why the rover is to stop, with the hash of its path and what was
+                known; called in the executor's thread.
         """
         self._node, self._service = node, service
         self._find_pose, self._report_stop = find_pose, report_stop
@@ -89,7 +84,7 @@ class PathWatch:
         self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
         self._state = node.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
         self._map_age = math.nan
-        self._looked, self._idle_until = time.monotonic(), 0.0
+        self._looked = time.monotonic()
         self._stop_is_new = threading.Event()
         self._changed = threading.Condition()
         self._new_path: WatchedPath | None = None
@@ -101,6 +96,8 @@ class PathWatch:
         self.apply()
         self._heartbeat = threading.Thread(target=self._send_stops, name="heartbeat", daemon=True)
         self._heartbeat.start()
+        assert self._heartbeat.native_id is not None
+        node.urgent_threads = (self._heartbeat.native_id,)
 
     def apply(self) -> None:
         """Follow the parameter `monitor`."""
@@ -126,12 +123,6 @@ class PathWatch:
         return replace(health, values={**health.values, "map_age": f"{self._map_age:.1f} s"})
 
     @property
-    def heartbeat_thread(self) -> int:
-        """Id of the thread that sends the heartbeat."""
-        assert self._heartbeat.native_id is not None
-        return self._heartbeat.native_id
-
-    @property
     def _stops(self) -> bool:
         """True if the rover is to stop: while paths are watched, it may drive a watched one."""
         return self.enabled and self.finding.state in (IDLE, STOPPED)
@@ -142,11 +133,12 @@ class PathWatch:
             self._node.handover.call(self.beat)
 
     def beat(self) -> None:
-        """Have a look taken if one is due, and publish `~/watch`; to be called each PERIOD."""
-        now = time.monotonic()
-        if not self.is_idle or now >= self._idle_until:
-            self._idle_until = now + IDLE_PERIOD
-            self._offer_sight()
+        """Have a look taken and publish `~/watch`.
+
+        To be called each PERIOD, and each second while the watch is idle: then the suspension is
+        compared for the diagnostics.
+        """
+        self._offer_sight()
         if self._is_alive and self._state.get_subscription_count():
             health, name = self.describe(), self._service.settings.rover.name
             status = make_status(MONITOR, health.level, health.message, health.values, name)
@@ -164,7 +156,7 @@ class PathWatch:
 
     def _send_stops(self) -> None:
         """Publish ~/stop each PERIOD and when it is new; a watch that hangs says nothing."""
-        while not self._life.is_over and self._node.context.ok():
+        while self._life.stopped is None and self._node.context.ok():
             if self._is_alive:
                 self._node.guard.call(lambda: self._stop.publish(Bool(data=self._stops)))
             self._stop_is_new.wait(PERIOD)
@@ -215,8 +207,8 @@ class PathWatch:
         self._rehearse()
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._sight is not None or self._life.is_over)
-                if self._life.is_over:
+                self._changed.wait_for(lambda: self._sight or self._life.stopped)
+                if self._life.stopped is not None:
                     return
                 sight, path = self._sight, self._new_path
                 self._sight = self._new_path = None
@@ -227,7 +219,8 @@ class PathWatch:
             except QuestionStoppedError:
                 return
             except Exception as error:
-                finding = self._fail(error)
+                text = f"internal error: {self._node.guard.report('monitor', error)}"
+                finding = self._monitor.stop(refusal("internal_error", text))
             self._hand_over(finding, sight)
 
     def _look(self, sight: Sight, path: WatchedPath | None) -> Finding:
@@ -237,11 +230,6 @@ class PathWatch:
             logger = self._node.get_logger()
             logger.warning("monitor: the rover does not stand on the accepted path; not watched")
         return self._monitor.look(sight)
-
-    def _fail(self, error: Exception) -> Finding:
-        """Return that the rover is to stop because the rest of its path could not be judged."""
-        text = self._node.guard.report("monitor", error)
-        return self._monitor.stop(refusal("internal_error", f"internal error: {text}"))
 
     def _hand_over(self, finding: Finding, sight: Sight) -> None:
         """Publish a finding at once; classes of a stop's waypoints take longer and follow.

@@ -175,14 +175,14 @@ class TractionMaps(MapIntake):
         rover: Callable[[], Rover],
         frames: NodeFrames,
     ):
-        """Start the thread.
+        """Begin without a map.
 
         Args:
             node: The node.
             rover: Returns the rover for which maps are prepared.
             frames: Knows where the frames of clouds are on the map.
         """
-        self._rover, self._listen = rover, frames.listen
+        self._rover = rover
         self._ready: MapContactFinder | None = None
         super().__init__(node.get_logger(), node.values, frames)
 
@@ -190,12 +190,6 @@ class TractionMaps(MapIntake):
         """Prepare the last map again if a parameter of it has changed."""
         if self.take_parameters(values):
             self.repeat()
-
-    def look_for_frame(self) -> None:
-        """Listen to /tf if a map needs it, and take it when its frame is known; call it often."""
-        if self.waits_for_frame:
-            self._listen()  # only then: /tf of a whole robot costs the loop time
-            self.retry()
 
     def take(self) -> MapContactFinder | None:
         """Return the map that was prepared since the last call, None if there is none."""

@@ -39,9 +39,15 @@ class Budget:
         return self._deadline - self._clock()
 
     @property
-    def is_over(self) -> bool:
-        """True if the deadline has passed or the question was cancelled."""
-        return self._stopped is not None or self.remaining <= 0.0
+    def stopped(self) -> QuestionStoppedError | None:
+        """Why the question is over: it was stopped, or took too long; None while it is not."""
+        if self._stopped is None and self.remaining <= 0.0:
+            self.stop(
+                TOO_LONG,
+                f"no answer was found within the time budget of {self.seconds:g} s; ask for a "
+                "shorter path, fewer candidates or wider waypoints, or raise time_budget",
+            )
+        return self._stopped
 
     def stop(self, code: str, reason: str) -> None:
         """Make every later `check` raise with this code and reason; the first stop counts."""
@@ -53,11 +59,5 @@ class Budget:
         Raises:
             QuestionStoppedError: The deadline has passed, or the question was stopped.
         """
-        if self._stopped is None and self.remaining <= 0.0:
-            self.stop(
-                TOO_LONG,
-                f"no answer was found within the time budget of {self.seconds:g} s; ask for a "
-                "shorter path, fewer candidates or wider waypoints, or raise time_budget",
-            )
-        if self._stopped is not None:
-            raise self._stopped
+        if self.stopped is not None:
+            raise self.stopped

@@ -84,10 +84,9 @@ class QuestionQueue:
         """Refuse waiting questions just before their deadline, one in work `grace` [s] after."""
         for asked in list(self._open):
             budget = asked.budget
-            if asked.has_begun and budget.remaining < -grace:
-                self._close(asked, _refuse_stopped(asked))
-            elif not asked.has_begun and budget.remaining < HOPELESS * budget.seconds:
-                self._close(asked, _refuse_waiting(asked))
+            least = -grace if asked.has_begun else HOPELESS * budget.seconds
+            if budget.remaining < least:
+                self._close(asked, _refuse_late(asked))
 
     def stop_all(self, code: str, reason: str) -> int:
         """Stop all open questions with a code and reason; return their number."""
@@ -120,8 +119,8 @@ class QuestionQueue:
 
     def _find(self, asked: Asked) -> Any:
         """Return the judgement of a question, or its refusal."""
-        if asked.budget.is_over:
-            return _refuse_stopped(asked)
+        if asked.budget.stopped is not None:
+            return _refuse_late(asked)
         asked.has_begun = True
         try:
             with interruptible(asked.budget.check):
@@ -135,18 +134,10 @@ class QuestionQueue:
             return asked.question.refuse("internal_error", f"internal error: {text}")
 
 
-def _refuse_stopped(asked: Asked) -> Any:
-    """Return the refusal of a question that is over: stopped, not begun in time, or too long."""
-    try:
-        asked.budget.check()
-    except QuestionStoppedError as error:
-        if error.code == TOO_LONG and not asked.has_begun:
-            return _refuse_waiting(asked)
-        return asked.question.refuse(error.code, str(error))
-    raise AssertionError("the question is not over")
-
-
-def _refuse_waiting(asked: Asked) -> Any:
-    """Return the refusal of a question that was not begun in time."""
+def _refuse_late(asked: Asked) -> Any:
+    """Return the refusal of a question that was stopped, not begun in time, or took too long."""
+    stopped = asked.budget.stopped
+    if stopped is not None and (asked.has_begun or stopped.code != TOO_LONG):
+        return asked.question.refuse(stopped.code, str(stopped))
     reason = f"others were in work for its time budget of {asked.budget.seconds:g} s; "
     return asked.question.refuse(BUSY, f"{reason}ask again later")

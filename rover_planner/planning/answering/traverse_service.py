@@ -3,25 +3,31 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
-from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain, fingerprint
 from rover_physics.terrain.ground import pack_ground
+from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.layers import CellSources
 from rover_planner.parameters.traverse_server import OFF
-from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.learned_ground import LearnedGround, lay_friction
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.search.edge_memory import EdgeMemory
 
+MAX_AGE = 1.0
+"""Age up to which a measurement counts as one of now [s]."""
 
-class TraverseService(Measurements):
+
+class TraverseService:
     """Keeps the last valid map, path and measurements, and answers queries about them.
 
     Maps may be taken in another thread than the rest.
@@ -29,7 +35,7 @@ class TraverseService(Measurements):
 
     def __init__(self, settings: ServiceSettings, clock: Callable[[], float] = time.monotonic):
         """Begin without a map; `clock` returns the time [s] that measurements and maps age by."""
-        super().__init__(clock)
+        self._clock = clock
         self.settings = settings
         """The current settings; after a change of `largest_gap` call `refresh_map`."""
         self.known_map: KnownMap | None = None
@@ -42,6 +48,12 @@ class TraverseService(Measurements):
         self._edge_memory = EdgeMemory()
         self._ground: LearnedGround | None = None
         self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
+        self._joints: dict[str, float] = {}
+        self._joint_times: dict[str, float] = {}
+        self._pose: NDArray[np.float64] | None = None
+        self._pose_time = -np.inf
+        self._tilt: tuple[float, float] | None = None
+        self._tilt_time = -np.inf
 
     @property
     def terrain(self) -> Terrain | None:
@@ -49,15 +61,51 @@ class TraverseService(Measurements):
         return None if self.known_map is None else self.known_map.terrain
 
     @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints whose angles are used: those of suspension and manipulator."""
-        return SUSPENSION_JOINTS + self.settings.manipulator_joints
+    def joints(self) -> dict[str, float]:
+        """Measured angles [rad] by name, of any age."""
+        return dict(self._joints)
 
-    @property
-    def all_joint_names(self) -> tuple[str, ...]:
-        """Names of all joints of the model: suspension, wheels, steering and manipulator."""
-        drive = SUSPENSION_JOINTS + WHEEL_JOINTS + STEERING_JOINTS
-        return drive + self.settings.manipulator_joints
+    def take_joints(self, positions: Mapping[str, float]) -> None:
+        """Keep measured joint angles [rad] by name; angles of other joints stay."""
+        self._joints.update(positions)
+        self._joint_times.update(dict.fromkeys(positions, self._clock()))
+
+    def take_pose(self, pose: NDArray[np.float64]) -> None:
+        """Keep the measured x, y, z [m], roll, pitch, yaw [rad] (6,) of the body, map frame."""
+        self._pose, self._pose_time = pose, self._clock()
+
+    def take_tilt(self, roll: float, pitch: float) -> None:
+        """Keep roll and pitch [rad] of the body, measured by an IMU."""
+        self._tilt, self._tilt_time = (roll, pitch), self._clock()
+
+    def standing(self) -> Standing | None:
+        """Return pose and suspension if all of them are not older than MAX_AGE, else None.
+
+        Roll and pitch are those of the IMU if there ever was one, else those of the pose.
+        """
+        now = self._clock()
+        times = [self._joint_times.get(name, -np.inf) for name in SUSPENSION_JOINTS]
+        if self._pose is None or now - min(*times, self._pose_time) > MAX_AGE:
+            return None
+        x, y, z, roll, pitch, yaw = self._pose.tolist()
+        if self._tilt is not None:
+            if now - self._tilt_time > MAX_AGE:
+                return None
+            roll, pitch = self._tilt
+        suspension = {name: self._joints[name] for name in SUSPENSION_JOINTS}
+        return Standing(x, y, z, roll, pitch, yaw, suspension)
+
+    def fresh_pose(self, max_age: float = MAX_AGE) -> NDArray[np.float64] | None:
+        """Return the pose (3,) x, y [m], yaw [rad] if it is not older than `max_age` [s]."""
+        if self._pose is None or self._clock() - self._pose_time > max_age:
+            return None
+        return self._pose[[0, 1, 5]]
+
+    def pose_with_suspension(self) -> NDArray[np.float64] | None:
+        """Return the pose (3,) if it and the suspension's angles are not older than MAX_AGE."""
+        times = [at for name, at in self._joint_times.items() if name in SUSPENSION_JOINTS]
+        is_fresh = bool(times) and self._clock() - min(times) <= MAX_AGE
+        return self.fresh_pose() if is_fresh else None
 
     def take_terrain(
         self,

@@ -172,24 +172,20 @@ class TransformTree:
         if target == source:
             return Rigid.none()
         with self._lock:
-            return self._find(target, source, time, now)
-
-    def _find(self, target: str, source: str, time: int | None, now: int) -> Rigid:
-        up, down = self._chain(source), self._chain(target)
-        shared = next((frame for frame in up if frame in down), None)
-        if shared is None:
-            raise TransformError(f"no transforms connect the frames {source!r} and {target!r}")
-        steps = up[: up.index(shared)], down[: down.index(shared)]
-        moving = [c for part in steps for c in part if not self._edges[c].is_static]
-        at = (
-            min((self._edges[c].stamps[-1] for c in moving), default=now) if time is None else time
-        )
-        for child in moving:
-            self._check(child, at, now)
-        found = [Rigid.none(), Rigid.none()]
-        for side, part in enumerate(steps):
-            for child in part:
-                found[side] = self._edges[child].at(at).then(found[side])
+            up, down = self._chain(source), self._chain(target)
+            shared = next((frame for frame in up if frame in down), None)
+            if shared is None:
+                raise TransformError(f"no transforms connect the frames {source!r} and {target!r}")
+            steps = up[: up.index(shared)], down[: down.index(shared)]
+            moving = [c for part in steps for c in part if not self._edges[c].is_static]
+            newest = min((self._edges[c].stamps[-1] for c in moving), default=now)
+            at = newest if time is None else time
+            for child in moving:
+                self._check(child, at, now)
+            found = [Rigid.none(), Rigid.none()]
+            for side, part in enumerate(steps):
+                for child in part:
+                    found[side] = self._edges[child].at(at).then(found[side])
         return found[1].inverse().then(found[0])
 
     def _chain(self, frame: str) -> list[str]:

@@ -142,9 +142,6 @@ def _slopes(
     heights: NDArray[np.float32], resolution: float, stride: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the slopes along x and y, of blocks of `stride` x `stride` cells the steepest."""
-    if min(heights.shape) < 2:
-        flat = np.zeros(heights.shape, np.float32)
-        return flat, flat
     along_y, along_x = (
         np.asarray(np.gradient(heights, resolution, axis=axis), np.float32) for axis in (0, 1)
     )
@@ -160,7 +157,7 @@ def _slopes(
 
 def _blocks(values: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
     """Return the values (ny, nx, stride^2) of each block of a grid; incomplete blocks are left."""
-    ny, nx = (max(1, size // stride) for size in values.shape)
+    ny, nx = (size // stride for size in values.shape)
     cut = values[: ny * stride, : nx * stride].reshape(ny, stride, nx, stride)
     return cut.swapaxes(1, 2).reshape(ny, nx, -1)
 

@@ -6,7 +6,6 @@ What the model found of an edge is kept until the ground under it changes.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,17 +18,6 @@ from rover_planner.planning.search.primitives import Piece, Primitive
 UNJUDGED, PASSES, FAILS = 0, 1, 2
 """States of an edge or node; states from FAILS on tell the limit that fails, see
 `Edges.codes`."""
-
-
-class PrimitiveTable(NamedTuple):
-    """The primitives of all headings as arrays, as kernels read them; P is the largest number."""
-
-    least_cost: NDArray[np.float64]
-    """(HEADINGS, P) cost on level ground [m]."""
-    links: NDArray[np.int64]
-    """(2, HEADINGS, L, 4) primitives that begin, and those that end with a heading: the heading at
-    the other end, the number among those of its first heading, and the step in x and y to the
-    other end [cells]. -1 ends a list."""
 
 
 @dataclass(eq=False)
@@ -47,6 +35,10 @@ class Edges:
     def __post_init__(self) -> None:
         self.width = max(len(own) for own in self.primitives)
         """Largest number of primitives of a heading, P."""
+        self.least_cost = np.full((HEADINGS, self.width), np.inf)
+        """(HEADINGS, P) cost of the primitives on level ground [m]."""
+        for costs, own in zip(self.least_cost, self.primitives, strict=True):
+            costs[: len(own)] = [one.least_cost for one in own]
         shape = (self.nodes.count, self.width)
         self.state = np.zeros(shape, np.int8)
         """(nodes, P) UNJUDGED, PASSES, or FAILS + i for the failure `codes[i]`."""
@@ -58,20 +50,22 @@ class Edges:
         """Codes of the limits that failed so far."""
 
     @cached_property
-    def table(self) -> PrimitiveTable:
-        """The primitives as arrays."""
-        least_cost = np.full((HEADINGS, self.width), np.inf)
+    def links(self) -> NDArray[np.int64]:
+        """Primitives that begin, and those that end with a heading, (2, HEADINGS, L, 4).
+
+        Of each the heading at the other end, the number among those of its first heading, and the
+        step in x and y to the other end [cells]. -1 ends a list.
+        """
         lists: list[list[tuple[int, ...]]] = [[] for _ in range(2 * HEADINGS)]
         for heading, own in enumerate(self.primitives):
             for k, primitive in enumerate(own):
                 (x, y), end = primitive.step, primitive.end_heading
-                least_cost[heading, k] = primitive.least_cost
                 lists[heading].append((end, k, x, y))
                 lists[HEADINGS + end].append((heading, k, -x, -y))
         links = np.full((2 * HEADINGS, max(map(len, lists)), 4), -1)
         for row, found in zip(links, lists, strict=True):
             row[: len(found)] = found
-        return PrimitiveTable(least_cost, links.reshape(2, HEADINGS, -1, 4))
+        return links.reshape(2, HEADINGS, -1, 4)
 
     @cached_property
     def samples(self) -> NDArray[np.float64]:
@@ -104,7 +98,7 @@ class Edges:
         """Return the nodes (n,) where edges (n,) end; they must be in the window."""
         node, k = np.divmod(edges, self.width)
         place, heading = np.divmod(node, HEADINGS)
-        end_heading, _, x, y = self.table.links[0, heading, k].T
+        end_heading, _, x, y = self.links[0, heading, k].T
         return (place + y * self.nodes.shape[1] + x) * HEADINGS + end_heading
 
     def write(self, edge: int, code: str, cost: float) -> None:

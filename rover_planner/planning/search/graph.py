@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
 from rover_planner.planning.search.difficulty import LEAST_DIFFICULTY, Difficulty, difficulty_of
-from rover_planner.planning.search.edges import FAILS, PASSES, Edges, PrimitiveTable
+from rover_planner.planning.search.edges import FAILS, PASSES, Edges
 from rover_planner.planning.search.nodes import HEADINGS
 
 PRICE = 4.0
@@ -38,8 +38,10 @@ NO_LIMIT = np.iinfo(np.int64).max
 class Graph(NamedTuple):
     """A lattice with what is known of it."""
 
-    table: PrimitiveTable
-    """The primitives."""
+    least_cost: np.ndarray
+    """(HEADINGS, P) costs of the primitives on level ground [m]."""
+    links: np.ndarray
+    """(2, HEADINGS, L, 4) the primitives, see `Edges`."""
     state: np.ndarray
     """(nodes, P) states of the edges, see `Edges`."""
     cost: np.ndarray
@@ -76,8 +78,6 @@ class ToGoal(NamedTuple):
     """(2,) row and column of the place that was measured towards, the start."""
     radius: float
     """Distance of the start's connections from there [m]."""
-    cell: float
-    """Distance of neighbouring nodes [m]."""
     limit: float
     """All costs are known for which the sum with the bound from the start is at most this [m]."""
 
@@ -114,7 +114,7 @@ def edge_cost(graph, node, k, end):
         return np.inf
     if state == PASSES:
         return float(graph.cost[node, k])
-    least = graph.table.least_cost[node % HEADINGS, k]
+    least = graph.least_cost[node % HEADINGS, k]
     if graph.caution == 0.0:
         return least
     price = PRICE * graph.difficulty.cell
@@ -128,7 +128,7 @@ def _is_too_dear(graph, node, k, here, known):
 
     It may say no where it does not know: it takes the ground as level.
     """
-    least = graph.table.least_cost[node % HEADINGS, k]
+    least = graph.least_cost[node % HEADINGS, k]
     least += graph.caution * PRICE * graph.difficulty.cell * LEAST_DIFFICULTY
     return here + least >= known and graph.state[node, k] != PASSES
 
@@ -147,7 +147,7 @@ def _neighbour(graph, node, i, backwards):
     """
     none = np.int64(-1)
     heading, place = node % HEADINGS, node // HEADINGS
-    link = graph.table.links[1 if backwards else 0, heading, i]
+    link = graph.links[1 if backwards else 0, heading, i]
     if link[0] < 0:
         return none, none, none
     row, column = place // graph.columns + link[3], place % graph.columns + link[2]
@@ -163,7 +163,7 @@ def _bound(graph, node, backwards, to_goal):
     place = node // HEADINGS
     rows = place // graph.columns - to_goal.focus[0]
     along = place % graph.columns - to_goal.focus[1]
-    from_start = max(to_goal.cell * np.hypot(rows, along) - to_goal.radius, 0.0)
+    from_start = max(graph.difficulty.cell * np.hypot(rows, along) - to_goal.radius, 0.0)
     if backwards:
         return from_start
     if to_goal.cost[node] + from_start <= to_goal.limit:
@@ -217,7 +217,7 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
         expanded += 1
         if leave[node] >= 0 and -negative + exits.costs[leave[node]] < best:
             best, found = -negative + exits.costs[leave[node]], leave[node]
-        for i in range(graph.table.links.shape[2]):
+        for i in range(graph.links.shape[2]):
             other, first, k = _neighbour(graph, node, i, backwards)
             if k < 0:
                 break
@@ -311,7 +311,7 @@ def _cut_off(graph, tree, cut):
         node = cut[done]
         done += 1
         tree.is_open[node] = False
-        for i in range(graph.table.links.shape[2]):
+        for i in range(graph.links.shape[2]):
             other, first, k = _neighbour(graph, node, i, False)
             if k < 0:
                 break
@@ -325,7 +325,7 @@ def _cut_off(graph, tree, cut):
 @exact_kernel
 def _reach_from_around(graph, tree, node):
     """Reach a node that was cut off by the best edge from an expanded node, if there is one."""
-    for i in range(graph.table.links.shape[2]):
+    for i in range(graph.links.shape[2]):
         other, first, k = _neighbour(graph, node, i, True)
         if k < 0:
             break
@@ -357,7 +357,7 @@ def spread(graph, seeds, backwards, inside, crossing):
         if graph.standing[seeds[i]] < FAILS and not inside[seeds[i]]:
             inside[seeds[i]] = True
             stack.append(seeds[i])
-    most = graph.table.links.shape[2]
+    most = graph.links.shape[2]
     visited = [np.int64(-1)]
     visited.clear()
     while len(stack) > 0:
@@ -417,7 +417,7 @@ class ShortestPaths:
         """Search from about the nodes of the first seeds; later ones must be among them."""
         self._edges, self._doubt, self._difficulty = edges, doubt, difficulty
         nodes, count = edges.nodes, edges.nodes.count
-        self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell, np.inf)
+        self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), np.inf)
         self._tree, self._changed = empty_tree(count), [starts.nodes]
         self._caution, self._measured, self._since = -1.0, 0, 0
         self.expanded = 0
@@ -456,7 +456,7 @@ class ShortestPaths:
         """Return the lattice as kernels read it."""
         edges = self._edges
         known = edges.state, edges.cost, edges.standing, self._doubt, self._difficulty
-        return Graph(edges.table, *known, caution, *edges.nodes.shape)
+        return Graph(edges.least_cost, edges.links, *known, caution, *edges.nodes.shape)
 
     def _begin(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
         """Begin with another caution: guess the costs to the goal at first, later measure them."""

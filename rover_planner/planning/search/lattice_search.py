@@ -137,7 +137,7 @@ class LatticeSearch:
         self.ends = _Ends(self.starts), _Ends(self.goals)
         """Judged connections of the start and of the goal."""
         self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
-        self._refused: list[tuple[int, int, float]] = []
+        self._refused: list[tuple[int, float]] = []
 
     def run(self, allowed: Callable[["LatticeSearch"], bool]) -> SearchProgress:
         """Search until the best path is found, no path is left, or it is not allowed to go on."""
@@ -148,7 +148,8 @@ class LatticeSearch:
                 if self.progress.exhausted:
                     break
         finally:
-            self._forget_refusals()
+            for edge, cost in self._refused:  # closed for this search only
+                self.edges.write(edge, "", cost)
         return self.progress
 
     def _step(self, caution: float) -> bool:
@@ -275,17 +276,11 @@ class LatticeSearch:
         """Close a part of a route for this search: it passes, but the whole path does not."""
         kept, index = self._parts(route)[number]
         if isinstance(kept, Edges):
-            self._refused.append((index, PASSES, float(kept.cost.flat[index])))
+            self._refused.append((index, float(kept.cost.flat[index])))
             kept.write(index, code, np.inf)
             self._note(index, 0.0)
         else:
             kept.costs[index] = np.inf
-
-    def _forget_refusals(self) -> None:
-        """Let the edges pass again that were closed for this search only."""
-        for edge, state, cost in self._refused:
-            self.edges.state.flat[edge], self.edges.cost.flat[edge] = state, cost
-        self._refused.clear()
 
 
 def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

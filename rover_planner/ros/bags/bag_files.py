@@ -96,19 +96,13 @@ class BagReader:
         Raises:
             PlanningError: The bag is damaged.
         """
-        stream = self._reader.messages(self._connections())
-        while True:
-            try:
-                connection, stamp, raw = next(stream)
-                kind = self._kinds[connection.topic]
+        try:
+            for connection, stamp, raw in self._reader.messages(self._connections()):
+                topic = connection.topic
                 message = self._deserialize(bytes(raw), connection.msgtype)
-            except StopIteration:
-                return
-            except Exception as error:  # each storage has errors of its own
-                raise PlanningError(
-                    f"{show_file(self._reader.path)}: is damaged: {error}"
-                ) from None
-            yield Recorded(kind, connection.topic, stamp, message)
+                yield Recorded(self._kinds[topic], topic, stamp, message)
+        except Exception as error:  # each storage has errors of its own
+            raise PlanningError(f"{show_file(self._reader.path)}: is damaged: {error}") from None
 
     def _connections(self) -> list[Any]:
         return [

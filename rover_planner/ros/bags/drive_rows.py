@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a recorded drive from a bag, as the rows that the ground is learned from."""
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from rover_physics.files.validation import show_file
 from rover_physics.numerics.arrays import Floats
 from rover_planner.errors import PlanningError
 from rover_planner.learning.drive_log import WIDTH, check_rows
-from rover_planner.ros.bags.bag_files import IMU, JOINTS, ODOMETRY, Recorded, open_bag
+from rover_planner.ros.bags.bag_files import IMU, JOINTS, ODOMETRY, open_bag
 from rover_planner.ros.row_collector import RowCollector
 
 
@@ -33,20 +34,12 @@ def read_rows(path: Path, odometry_topic: str) -> Floats:
                 raise PlanningError(f"{show_file(path)}: has no {kind}")
         for recorded in bag.messages():
             begin = recorded.stamp if begin < 0 else begin
-            try:
-                row = _take(collector, recorded, (recorded.stamp - begin) / NANOSECONDS)
-            except MessageError:
-                continue
-            if row is not None:
-                rows.append(row)
+            with contextlib.suppress(MessageError):
+                if recorded.kind == JOINTS:
+                    collector.take_joints(recorded.message)
+                elif recorded.kind == IMU:
+                    collector.take_imu(recorded.message)
+                elif recorded.kind == ODOMETRY:
+                    time = (recorded.stamp - begin) / NANOSECONDS
+                    rows.append(collector.take_odometry(recorded.message, time))
     return check_rows(np.array(rows).reshape(-1, WIDTH), str(show_file(path)))
-
-
-def _take(collector: RowCollector, recorded: Recorded, time: float) -> Floats | None:
-    if recorded.kind == JOINTS:
-        collector.take_joints(recorded.message)
-    elif recorded.kind == IMU:
-        collector.take_imu(recorded.message)
-    elif recorded.kind == ODOMETRY:
-        return collector.take_odometry(recorded.message, time)
-    return None

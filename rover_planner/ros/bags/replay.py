@@ -28,18 +28,6 @@ MAX_NOTES = 5
 """Number of refused messages with a note of their own."""
 
 
-@dataclass(frozen=True)
-class Questions:
-    """Questions that are asked of a bag."""
-
-    goal: tuple[float, float, float] | None = None
-    """Goal x, y [m], yaw [rad] of a question after each new map; None asks none."""
-    start: tuple[float, float, float] | None = None
-    """Its start; None takes the last odometry."""
-    stretch: float = 5.0
-    """Length of the stretches in which the recorded drive is judged [m]."""
-
-
 @dataclass(frozen=True, eq=False)
 class ReplayAnswer:
     """An answer to a question of a replay."""
@@ -64,8 +52,12 @@ class Replay:
 
     parameters: TraverseServerParameters
     """Parameters as of the node traverse_server."""
-    questions: Questions
-    """The questions."""
+    goal: tuple[float, float, float] | None = None
+    """Goal x, y [m], yaw [rad] of a question after each new map; None asks none."""
+    start: tuple[float, float, float] | None = None
+    """Its start; None takes the last odometry."""
+    stretch: float = 5.0
+    """Length of the stretches in which the recorded drive is judged [m]."""
     refused: dict[str, int] = field(default_factory=dict)
     """Number of messages that could not be used, by input."""
     notes: list[str] = field(default_factory=list)
@@ -119,12 +111,11 @@ class Replay:
         stamp = stamp_to_ns(header.stamp)
         source = frames.find_source(header.frame_id, stamp, recorded.topic)
         is_new = self.inputs.take_map(recorded.message, source, recorded.topic)
-        goal, given = self.questions.goal, self.questions.start
-        if not is_new or goal is None:
+        if not is_new or self.goal is None:
             return
-        end = frames.place_level(goal)
+        end = frames.place_level(self.goal)
         start: ArrayLike | None = self._service.fresh_pose(math.inf)
-        start = start if given is None else frames.place_level(given)
+        start = start if self.start is None else frames.place_level(self.start)
         if start is None:
             self.without_start += 1
             return
@@ -141,7 +132,7 @@ class Replay:
         pose = self._service.fresh_pose()
         assert pose is not None
         self._drive.add(pose, recorded.stamp, self._service.joints)
-        if self._drive.length >= self.questions.stretch:
+        if self._drive.length >= self.stretch:
             yield self._judge_drive()
             self._begun = self._service.snapshot(recorded.stamp)
 

@@ -92,7 +92,7 @@ def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Seque
         first_failure=first,
         reason=reasons[first] if first >= 0 else "",
     )
-    path = Judged(prediction.poses, prediction, verdict, (0.0, 0.0), scenario)
+    path = Judged(prediction.poses, prediction, verdict, scenario)
     return Shown(scenario, (path,), 0, 1)
 
 

@@ -29,8 +29,6 @@ from rover_planner.survey.store import SurveyStore
 from rover_planner.viewer.state.colours import UNKNOWN, to_css
 from rover_planner.viewer.state.layers import ColouredGround
 
-MAX_READ = 1200
-"""Most cells along a side that are read of a layer; of more, every second, third, ..."""
 CLASS, LIMIT = "survey: class", "survey: first limit"
 """Layers to choose from."""
 OPTION_NAMES = {"policy": "torque policy", "max_torque": "largest torque"}
@@ -55,7 +53,7 @@ class ShownSurvey:
             PlanningError: It is no survey, or one of another rover or map.
         """
         self._store = SurveyStore(path)
-        self._every = count_skipped(self._store, MAX_READ)
+        self._every = count_skipped(self._store.notes.layout.shape)
         recorded = self._store.notes.description
         if recorded["rover"] != to_plain(asdict(rover)):
             other = recorded["rover"]["name"]
@@ -81,7 +79,7 @@ class ShownSurvey:
         from matplotlib.colors import ListedColormap, to_hex
 
         if name == CLASS:
-            numbers = read_drawn_classes(self._store, self._every)
+            numbers = read_drawn_classes(self._store)
             palette, labels = [*CLASS_COLOURS], [*CLASS_LABELS]
         else:
             numbers = np.asarray(self._store.layer("first_limit")[:: self._every, :: self._every])

@@ -17,7 +17,7 @@ from support.planner_client import SERVER
 from support.ros_fixtures import call, hear
 from support.waiting import wait_until
 
-PASSABLE, IMPASSABLE, UNKNOWN = VALUES[0], VALUES[-1], -1
+PASSABLE, _, _, IMPASSABLE, UNKNOWN = VALUES.tolist()
 
 
 def rock_at(place):

@@ -27,7 +27,7 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
-from rover_planner.planning.path_query import path_cost
+from rover_planner.planning.path_query import Candidate
 from support.paths import poses_at
 from support.rough_grounds import plane, with_std
 from support.rovers import LSR1
@@ -163,7 +163,7 @@ def test_only_the_clearance_over_unknown_ground_may_be_unknown():
 def test_a_path_of_unknown_energy_costs_more_than_any_other():
     prediction, verdict = judge_path(LSR1, LEVEL, POSES)
     unknown = prediction.change(energy=np.full(len(POSES), math.nan))
-    assert path_cost(unknown, verdict) == (math.inf, math.inf)
+    assert Candidate(POSES, unknown, verdict).cost == (math.inf, math.inf)
 
 
 @given(*[st.floats()] * 6)

@@ -161,12 +161,12 @@ def test_a_budget_tells_why_it_stopped_and_the_first_reason_counts():
     now = [0.0]
     budget = Budget(2.0, lambda: now[0])
     budget.check()
-    assert budget.remaining == 2.0 and not budget.is_over
+    assert budget.remaining == 2.0 and budget.stopped is None
     now[0] = 2.5
     with pytest.raises(QuestionStoppedError, match="time budget of 2 s") as stopped:
         budget.check()
     budget.stop(CANCELLED, "later")
-    assert stopped.value.code == TOO_LONG and budget.is_over
+    assert stopped.value.code == TOO_LONG and budget.stopped is stopped.value
     with pytest.raises(QuestionStoppedError, match="time budget"):
         budget.check()
     check_interruption()  # outside a question nothing stops

@@ -148,12 +148,12 @@ def test_the_measured_suspension_is_compared_with_the_predicted_one():
     service.take_joints(predicted)
     judgement = service.snapshot().check_path()
     assert judgement.suspension is None  # where the rover stands is not known
-    service.take_pose(np.array([0.0, 0.0, 0.3]))
+    service.take_pose(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.3]))
     judgement = service.snapshot().check_path()
     assert judgement.suspension.suspension_agrees and not judgement.report.has_warning
     assert judgement.suspension.suspension_mismatch == dict.fromkeys(SUSPENSION_JOINTS, 0.0)
     service.take_joints({"bogie_left": predicted["bogie_left"] + 0.2})
-    service.take_pose(np.array([0.0, 0.0, 0.3]))
+    service.take_pose(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.3]))
     elsewhere = np.array([[0.5, 0.15, 0.3], [1.0, 0.3, 0.3]])
     service.given_path = GivenPath(elsewhere, "")
     judgement = service.snapshot().check_path()

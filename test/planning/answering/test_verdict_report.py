@@ -23,7 +23,7 @@ DOCS = Path(__file__).parents[3] / "docs" / "traverse_server.md"
 def service():
     service = make_service(make_terrain(wall_at(0.5)), candidate_count=2, planner="fan")
     service.take_joints(dict.fromkeys(SUSPENSION_JOINTS, 0.0))
-    service.take_pose(np.array([-2.0, 0.0, 0.0]))
+    service.take_pose(np.array([-2.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     return service
 
 

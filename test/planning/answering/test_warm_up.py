@@ -16,7 +16,7 @@ from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.nodes.warm_up import GROUPS
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.simulator.simulation import Simulation, SimulationSettings
+from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, wall_at, waves
 from support.learning_drives import climb
 from support.services import make_service
@@ -49,7 +49,7 @@ for parameters, asked in (
         answering.given_path = GivenPath(np.array([start, goal]), "")
         answering.snapshot().check_path().complete()
 given = RoverSimulatorParameters(start_x=-1.0)
-simulation = Simulation(SimulationSettings(load_rover("lsr1"), grounds[0], given))
+simulation = Simulation(load_rover("lsr1"), grounds[0], given)
 simulation.take_path(np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
 for _ in range(3):
     simulation.advance(0.0, 0.02)
@@ -58,7 +58,7 @@ for _ in range(3):
 learner = GroundLearner(load_rover("lsr1"), grounds[0], soil="dry_sand")
 for row in climb(load_rover("lsr1"), 0.1, 4.0):
     learner.take(row)
-assert learner.estimate.soil and learner.layers
+assert learner.estimate.soil and learner.layers.size
 after = compiled()
 print({name: count for name, count in after.items() if count > before.get(name, 0)})
 """

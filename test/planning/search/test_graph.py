@@ -23,7 +23,7 @@ def random_knowledge(seed):
     known = Edges(NODES, PRIMITIVES)
     judged = rng.random(known.state.shape) < 0.5
     known.state[judged] = rng.choice([PASSES, PASSES, FAILS], judged.sum())
-    least = np.tile(EDGES.table.least_cost, (EDGES.nodes.count // 16, 1))
+    least = np.tile(EDGES.least_cost, (EDGES.nodes.count // 16, 1))
     known.cost[:] = np.where(np.isfinite(least), least, 0.0) * (1.0 + rng.random(least.shape))
     known.standing[rng.random(EDGES.nodes.count) < 0.3] = FAILS
     return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness(rng)
@@ -40,7 +40,7 @@ def hardness(rng):
 
 def cost_of(graph, node, k, end):
     """Return the cost of an edge that is not refused."""
-    least = graph.table.least_cost[node % 16, k]
+    least = graph.least_cost[node % 16, k]
     if graph.state[node, k] == PASSES:
         return graph.cost[node, k]
     if graph.caution == 0.0:

@@ -12,20 +12,20 @@ from rover_physics.traction.balance import BalanceWriter
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.planning.angles import wrap
+from rover_planner.simulator import range_sensor
 from rover_planner.simulator.driving_forces import find_driving_forces
-from rover_planner.simulator.mujoco_plant import MujocoPlant
+from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.simulator.second_try import SecondTry
-from rover_planner.simulator.simulation import Simulation, SimulationSettings
+from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
 from support.rovers import FIXED, LSR1
 
 STEP, SPEED = 0.02, 0.06
 WAVY, LEVEL = make_terrain(waves, half=3.0), plane(0.0, 0.0, half=3.0)
-ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
+ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoRover])
 
 
 def drive(plant, seconds: float, speed: float = SPEED, yaw_rate: float = 0.0):
@@ -146,7 +146,7 @@ def test_a_rover_that_stands_is_not_computed_again_and_nothing_else_changes(monk
 def test_drives_without_commands_are_braked():
     given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
     slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
-    simulation = Simulation(SimulationSettings(LSR1, slope, given))
+    simulation = Simulation(LSR1, slope, given)
 
     def roll(begin):
         return [simulation.advance(begin + STEP * k, STEP).velocity[0] for k in range(25)][-1]
@@ -162,7 +162,7 @@ def test_drives_without_commands_are_braked():
 
 def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
     given = RoverSimulatorParameters(start_x=-1.0, stop_timeout=0.4)
-    simulation = Simulation(SimulationSettings(LSR1, WAVY, given))
+    simulation = Simulation(LSR1, WAVY, given)
     simulation.take_path(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
 
     def speeds(begin, seconds):
@@ -182,7 +182,7 @@ def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
 
 def test_both_engines_drive_the_same_way():
     start = (-1.0, 0.2, 0.0)
-    still, moving = QuasiStaticPlant(LSR1, WAVY, start), MujocoPlant(LSR1, WAVY, start)
+    still, moving = QuasiStaticPlant(LSR1, WAVY, start), MujocoRover(LSR1, WAVY, start)
     states = [drive(plant, 3.0) for plant in (still, moving)]
     assert states[1].position == pytest.approx(states[0].position, abs=0.04)
     for name in SUSPENSION_JOINTS:
@@ -217,7 +217,7 @@ def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_no
     hole = lambda x, y: waves(x, y) + np.where(np.hypot(x, y) < 0.3, np.nan, 0.0)  # noqa: E731
     ground = make_terrain(hole, half=3.0)
     given = RoverSimulatorParameters(start_x=-0.6)
-    simulation = Simulation(SimulationSettings(LSR1, ground, given))
+    simulation = Simulation(LSR1, ground, given)
     drive(simulation.plant, 13.0)
     assert simulation.plant.pose()[0] > 0.1  # a server that interpolates has let it pass
     assert np.isnan(simulation.look(simulation.plant.state().position, 0.0).elevation_at(0.0, 0.0))
@@ -227,7 +227,7 @@ def look(ground, **changes):
     values = {"range": 2.0, "noise": 0.0, "height": 0.8, "occlusion": True} | changes
     asked = RoverSimulatorParameters(**{f"sensor_{key}": value for key, value in values.items()})
     position, rng = np.array([0.0, 0.0, 0.3]), np.random.default_rng(1)
-    return RangeSensor(asked).look(ground, position, rng)
+    return range_sensor.look(asked, ground, position, 0.0, rng)
 
 
 def test_the_sensor_sees_the_ground_in_its_range_and_no_farther():
@@ -321,7 +321,7 @@ def drive_along(plant, path):
     return max(away), np.array(poses), states
 
 
-@pytest.mark.parametrize(("engine", "side"), [(QuasiStaticPlant, 1.0), (MujocoPlant, -1.0)])
+@pytest.mark.parametrize(("engine", "side"), [(QuasiStaticPlant, 1.0), (MujocoRover, -1.0)])
 def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
     plant = engine(LSR1, LEVEL, (0.0, 0.0, 0.0))
     path = arc(side * 1.2, side * 0.6)
