@@ -3,7 +3,6 @@
 
 from dataclasses import dataclass
 
-from rover_physics.names import WHEEL_COUNT
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
@@ -11,10 +10,9 @@ from rover_physics.traction.balance import BalanceWriter
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 
-TORQUE_RATE_RATIO = 1.0
-"""Default of torque_rate over the torque that pulls with a sixth of the rover's weight [1/s].
-
-Where torques jump, as when a wheel meets a wall, wheels begin to slip and stick by turns."""
+TORQUE_RATE_RATIO = 0.25
+"""Default of torque_rate over the rover's weight times the wheel radius [1/s]. Where torques jump,
+as when a wheel meets a wall, wheels begin to slip and stick by turns."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ class TractionSettings:
     @property
     def torque_rate(self) -> float:
         """Largest rate of change of a torque [N m/s]."""
-        full_pull = self.rover.weight * self.rover.wheel.radius / WHEEL_COUNT
+        full_pull = self.rover.weight * self.rover.wheel.radius
         return self.parameters.torque_rate or TORQUE_RATE_RATIO * full_pull
 
 
