@@ -21,6 +21,7 @@ def study(
     Exit code 0: it ran. 2: bad input.
     """
     need("matplotlib", "the picture of a study")
+    from rover_planner.figures.study_plot import draw_study
     from rover_planner.shell.progress import show_bar
     from rover_planner.studies.rover_values import write_rover
     from rover_planner.studies.runner import (
@@ -31,7 +32,6 @@ def study(
         run_study,
     )
     from rover_planner.studies.study_file import find_examples, load_study
-    from rover_planner.studies.study_plot import draw_study
 
     task = load_study(find_examples().get(str(file), file))
     typer.echo("\n".join(describe_question(task)))

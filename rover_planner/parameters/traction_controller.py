@@ -68,7 +68,7 @@ class TractionControllerParameters(ParameterTable):
     )
     torque_rate: float = parameter(
         0.0,
-        "Largest change of a torque; 0 is ten times the largest torque a second.",
+        "Largest change of a torque; 0 is a quarter of weight times wheel radius a second.",
         "N m/s",
         (0.0, 1e6),
     )

@@ -97,24 +97,18 @@ class _Run:
         self._fill(under_way)
         for future in under_way:
             chunk = self._chunk_of.pop(future.key)
-            if future.status == "finished":
-                self._take(future.result())
-            elif future.status != "error":
+            if future.status not in ("finished", "error"):
                 raise PlanningError(GONE)
-            elif _is_killed(future.exception()):
+            if _is_killed(future.exception()):
                 suspects.append(chunk)
             else:
-                self._give_up(chunk, future.exception())
+                self._settle(chunk, future)
             future.release()
             self._fill(under_way)
         for chunk in suspects:
             # Alone, so that a chunk is not blamed for another with which its worker died.
             future = self._submit(chunk, "alone")
-            error = future.exception()  # waits for the end
-            if error is None:
-                self._take(future.result())
-            else:
-                self._give_up(chunk, error)
+            self._settle(chunk, future)
             future.release()
         return self._outcome
 
@@ -141,22 +135,24 @@ class _Run:
             self._task, self._job, chunk, key=key, pure=False, retries=ATTEMPTS - 1
         )
 
-    def _take(self, report: ChunkReport) -> None:
-        if report.refusal:
-            raise PlanningError(f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}")
-        self._outcome.done += 1
-        self._outcome.poses += report.poses
-        self._on_chunk(report)
+    def _settle(self, chunk: Index, future: Any) -> None:
+        """Note what became of a chunk; raise PlanningError if the others will fail as it did."""
+        error = future.exception()  # waits for the end
+        if error is None:
+            report = future.result()
+            if report.refusal:
+                told = f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}"
+                raise PlanningError(told)
+            self._outcome.done += 1
+            self._outcome.poses += report.poses
+            self._on_chunk(report)
+        elif type(error).__name__ in ("NoWorkerError", "NoValidWorkerError"):
+            raise PlanningError(ALONE)
+        elif _is_killed(error):
+            self._outcome.failed[chunk] = f"its worker died {ATTEMPTS} times"
+        else:
+            self._outcome.failed[chunk] = f"{type(error).__name__}: {error}"
 
-    def _give_up(self, chunk: Index, error: BaseException) -> None:
-        """Note that a chunk failed; raise PlanningError if the others will fail as it did."""
-        if type(error).__name__ in ("NoWorkerError", "NoValidWorkerError"):
-            raise PlanningError(ALONE) from None
-        why = f"{type(error).__name__}: {error}"
-        self._outcome.failed[chunk] = (
-            f"its worker died {ATTEMPTS} times" if _is_killed(error) else why
-        )
 
-
-def _is_killed(error: BaseException) -> bool:
+def _is_killed(error: BaseException | None) -> bool:
     return type(error).__name__ == "KilledWorker"

@@ -10,8 +10,9 @@ from rover_physics.traction.balance import BalanceWriter
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 
-TORQUE_RATE_RATIO = 10.0
-"""Default of torque_rate over the rover's largest torque [1/s]."""
+TORQUE_RATE_RATIO = 0.25
+"""Default of torque_rate over the rover's weight times the wheel radius [1/s]. Where torques jump,
+as when a wheel meets a wall, wheels begin to slip and stick by turns."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class TractionSettings:
     @property
     def torque_rate(self) -> float:
         """Largest rate of change of a torque [N m/s]."""
-        return self.parameters.torque_rate or TORQUE_RATE_RATIO * self.rover.wheel.max_torque
+        full_pull = self.rover.weight * self.rover.wheel.radius
+        return self.parameters.torque_rate or TORQUE_RATE_RATIO * full_pull
 
 
 def load_traction_settings(

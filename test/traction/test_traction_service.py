@@ -173,14 +173,14 @@ def test_no_change_of_a_parameter_moves_a_torque_faster_than_torque_rate(change)
     assert torques.any()
 
 
-def test_m2020_has_nine_tenths_of_its_torque_on_a_slope_within_a_fifth_of_a_second():
+def test_m2020_has_nine_tenths_of_its_torque_on_a_slope_within_a_third_of_a_second():
     rig = Rig(rover="m2020")
     rig.pitch = -np.radians(17.0)
     rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.03 / 0.2625)
     rover = rig.service.settings.rover
     wanted = rover.weight * np.sin(-rig.pitch) * rover.wheel.radius
     while rig.run(1).torques.sum() < 0.9 * wanted:
-        assert rig.now < 0.2
+        assert rig.now < 0.33
 
 
 def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():

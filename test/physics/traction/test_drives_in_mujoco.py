@@ -27,3 +27,18 @@ def test_a_promise_is_kept_where_one_wheel_needs_nearly_all_its_torque():
     rover, path = unlimited(load_rover("lsr1")), drive_path()
     assert judge_path(rover, bump.ground, path, asked)[1].traversable
     assert drive(bump, BY_MAP, tries=3, most_time=5.0).passed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("timestep", [0.002, 0.003, 0.004])
+def test_a_wheel_that_meets_a_wall_does_not_begin_to_slip_and_stick_by_turns(timestep):
+    """With torques that rose within a tenth of a second no drive passed."""
+    step = Obstacle("step", 0.2004, friction=0.716, max_torque=0.8416)
+    assert drive(step, BY_MAP, tries=3, most_time=5.0, timestep=timestep).passed
+
+
+@pytest.mark.long
+def test_a_side_slope_near_the_friction_is_crossed():
+    """Upper wheels seemed to slip, and the rover slid down by a metre."""
+    slope = Obstacle("cross_slope", 28.6, friction=0.652, max_torque=2.17)
+    assert drive(slope, BY_MAP, tries=3, most_time=5.0).passed
