@@ -88,7 +88,7 @@ def parse_learned(text: str, source: str, since: str = "") -> LearnedGround:
             for number, one in found.get("classes", {}).items()
         }
         return replace(_read_friction(found["friction"], source), since=since, classes=classes)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise PlanningError(
             f"{source}: has no friction with mean, std, low and high, as learn writes it: {error}"
         ) from None

@@ -89,7 +89,7 @@ def parse_place(text: str, source: str) -> MarkedPlace:
         values = json.loads(text)
         x, y, radius = (float(values[name]) for name in ("x", "y", "radius"))
         place = MarkedPlace(x, y, radius, str(values["reason"]), str(values["date"]))
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise PlanningError(
             f"{source}: is no place with x, y, radius, reason and date: {error}"
         ) from None

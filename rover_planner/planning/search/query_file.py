@@ -87,7 +87,7 @@ def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, Lat
     try:
         with errors_of(path), open_npz(path) as file:
             content = json.loads(str(file.read(_ENTRY, most=_MOST)))
-    except (RoverFileError, json.JSONDecodeError) as error:
+    except (RoverFileError, json.JSONDecodeError, RecursionError) as error:
         raise PlanningError(f"{path} holds no question for a path: {error}") from None
     with errors_of(path):
         asked: _Content = read_as(_Content, content, "a question for a path")

@@ -11,6 +11,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.maps.unobserved_ground import ASSUMED, ObservedGround, observed_ground
 from rover_planner.parameters.traverse_server import ALLOW_FOOTPRINT, AUTO, REFUSE
 from rover_planner.planning.answering.snapshot import GivenPath
+from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import (
     MARKED_CODE,
     NONE_MARKED,
@@ -71,6 +72,12 @@ def test_what_is_no_place_is_refused(change):
     text = json.dumps(vars(PLACE) | change)
     with pytest.raises(PlanningError, match="radius"):
         parse_place(text, "a test")
+
+
+@pytest.mark.parametrize("parse", [parse_place, parse_learned])
+def test_text_that_is_nested_without_end_is_refused(parse):
+    with pytest.raises(PlanningError, match="a test"):
+        parse("[" * 100_000, "a test")
 
 
 def flat_with_hole() -> Terrain:
