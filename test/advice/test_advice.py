@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path
+from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.advice import case as case_module
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
@@ -18,8 +19,9 @@ from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
+from rover_planner.planning.path_geometry import distance_along
 from support.grounds import make_terrain, rock_left
-from support.rovers import LSR1
+from support.rovers import FIXED, LSR1, M2020
 
 S = np.arange(-1.5, 1.6, 0.05)
 STRAIGHT = np.column_stack([S, 0.0 * S, 0.0 * S])
@@ -151,6 +153,15 @@ def test_two_poses_far_apart_are_start_and_goal():
     assert path_of(LSR1, ends[:1], 0.02) is not None
     near = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
     assert path_of(LSR1, near, 0.02).shape == (2, 3)
+
+
+@pytest.mark.parametrize("rover", [LSR1, M2020, FIXED], ids=["lsr1", "m2020", "fixed"])
+def test_the_path_between_start_and_goal_has_the_tightest_curve_of_the_rover(rover):
+    ends = np.array([[0.0, 0.0, 0.0], [-rover.wheelbase, 0.0, 0.0]])
+    path = path_of(rover, ends, 0.01)
+    turned = np.abs(np.diff(np.unwrap(path[:, 2])))
+    radius = np.diff(distance_along(path)).max() / turned.max()
+    assert radius == pytest.approx(tightest_radius(rover), rel=0.02)
 
 
 def test_energy_and_time_are_above_those_of_the_path_as_if_it_went_on():
