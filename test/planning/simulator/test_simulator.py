@@ -143,6 +143,21 @@ def test_a_rover_that_stands_is_not_computed_again_and_nothing_else_changes(monk
     assert same > 15
 
 
+@pytest.mark.parametrize("nominal", [0.003, 0.03, 1.0])
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_a_rover_stays_if_it_is_much_slower_than_its_own_speed(nominal, share):
+    """One motor saturates all the time, and the others brake against it."""
+    wheel = replace(LSR1.wheel, max_torque=0.5, max_speed=20.0)
+    rover = replace(LSR1, wheel=wheel, nominal_speed=nominal)
+    plant, against = QuasiStaticPlant(rover, LEVEL, (-2.0, 0.0, 0.0)), np.append(0.5, [-0.1] * 5)
+    for _ in range(150):
+        error = share * nominal - plant.state().velocity[0]
+        push = 2.0 * rover.total_mass * error * rover.wheel.radius
+        plant.pull(against + np.append(0.0, [push / 5.0] * 5), (nominal, 0.0), STEP)
+    assert plant.state().velocity[0] == pytest.approx(share * nominal, rel=0.3)
+    assert ("stay" in plant.state().stopped) == (share < 1.0 / 3.0)
+
+
 def test_drives_without_commands_are_braked():
     given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
     slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
