@@ -302,8 +302,10 @@ class PartwiseJudge:
         waypoint, code, reason = self._failure
         if self._bends is not None or code == "wheel_drop":
             return verdict
-        distance, *found = map(np.concatenate, zip(*self._courses, strict=True))
-        course = Course(self._poses, distance, *found, None)
+        distance, irreversible, drop, direction = map(
+            np.concatenate, zip(*self._courses, strict=True)
+        )
+        course = Course(self._poses, distance, irreversible, drop, direction, None)
         nominal = replace(verdict, first_failure=waypoint, code=code, reason=reason)
         asked = refuse_if_trapped(self._model, course, nominal)
         return verdict if asked is nominal else asked
