@@ -161,9 +161,8 @@ def make_oddities(folder: Path) -> list[str]:
     (folder / "to_zero").symlink_to("/dev/zero")
     with socket.socket(socket.AF_UNIX) as here:
         here.bind(str(folder / "socket"))
-    made = ["pipe", "folder", "loop", "dangling", "to_zero", "socket"]
     return [
-        *(str(folder / name) for name in made), "/dev/zero", "/dev/full", "/dev/stdin", "/proc",
+        *(str(folder / name) for name in KINDS), "/dev/zero", "/dev/full", "/dev/stdin", "/proc",
         "/proc/self/mem", "/proc/kmsg", "x" * 300, "x/" * 3000, "", ".", "..", "\n\x1b[2J", "é",
         "\udcff", "a\0b", str(folder / "folder" / ".." / "nowhere"),
     ]  # fmt: skip
