@@ -155,7 +155,7 @@ def follow_axis(
         most_time: Time after which a rover counts as stuck, as a multiple of the time at SPEED.
     """
     path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
-    follower = SecondTry(PathFollower(path, LOOK_AHEAD), tries)
+    follower = SecondTry(PathFollower(path, LOOK_AHEAD), plant.rover.wheel.radius, tries)
     control = make_controller(name, plant, obstacle)
     while plant.time < most_time * (END - START) / SPEED and plant.pose()[0] < END:
         command = follower.steer(plant.pose(), SPEED, plant.time)

@@ -92,8 +92,9 @@ def grid_map_of(
     resolution: float = 0.05,
     centre: tuple[float, float] = (0.0, 0.0),
     basic: tuple[str, ...] = ("elevation",),
+    order: str = "F",
 ) -> Any:
-    """Return a column-major GridMap, as grid_map stores it, of layers (ny, nx), x, y ascending."""
+    """Return a GridMap of layers (ny, nx), x, y ascending; grid_map itself stores by columns."""
     ny, nx = next(iter(layers.values())).shape
     header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0), frame_id="map")
     position = SimpleNamespace(x=centre[0], y=centre[1], z=0.0)
@@ -107,7 +108,8 @@ def grid_map_of(
     data = []
     for values in layers.values():
         stored = np.asarray(values, np.float32)[::-1, ::-1].T  # rows along -x, columns along -y
-        data.append(_array(stored.ravel(order="F"), ("column_index", ny), ("row_index", nx)))
+        dims = ("column_index", ny), ("row_index", nx)
+        data.append(_array(stored.ravel(order), *(dims if order == "F" else dims[::-1])))
     return SimpleNamespace(
         header=header,
         info=info,
@@ -120,25 +122,15 @@ def grid_map_of(
 
 
 def move_buffer(message: Any, row: int, column: int) -> Any:
-    """Return a column-major map whose circular buffer starts at another row and column."""
+    """Return the map with a circular buffer that starts at another row and column."""
     moved = copy.deepcopy(message)
     for array in moved.data:
-        columns, rows = (dim.size for dim in array.layout.dim)
-        cells = np.reshape(array.data, (rows, columns), order="F")
-        array.data = np.roll(cells, (row, column), (0, 1)).ravel(order="F")
+        sizes = {dim.label: dim.size for dim in array.layout.dim}
+        order = "F" if array.layout.dim[0].label == "column_index" else "C"
+        cells = np.reshape(array.data, (sizes["row_index"], sizes["column_index"]), order)
+        array.data = np.roll(cells, (row, column), (0, 1)).ravel(order)
     moved.outer_start_index, moved.inner_start_index = row, column
     return moved
-
-
-def store_by_rows(message: Any) -> Any:
-    """Return a column-major map in row-major storage."""
-    stored = copy.deepcopy(message)
-    for array in stored.data:
-        columns, rows = (dim.size for dim in array.layout.dim)
-        cells = np.reshape(array.data, (rows, columns), order="F")
-        array.layout = _array(cells.ravel(), ("row_index", rows), ("column_index", columns)).layout
-        array.data = cells.ravel()
-    return stored
 
 
 def _array(values: np.ndarray, *dims: tuple[str, int]) -> Any:

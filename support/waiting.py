@@ -26,15 +26,6 @@ def repeat_until(act: Callable[[], Any], condition: Callable[[], Any], what: str
     return wait_until(lambda: (act(), condition())[1], what)
 
 
-def start_watch() -> Callable[[], float]:
-    """Return what tells the time since now [s], without that of a machine that was elsewhere.
-
-    It is the smaller one of the time by the clock and of that for which this process computed.
-    """
-    clock, computed = time.monotonic(), time.process_time()
-    return lambda: min(time.monotonic() - clock, time.process_time() - computed)
-
-
 def is_running(pid: int) -> bool:
     """Tell whether a process is there and is more than an entry to be collected."""
     try:

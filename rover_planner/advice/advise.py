@@ -10,6 +10,7 @@ import numpy as np
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.advice.case import Case, JudgedCase
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import seek_remedies
@@ -125,7 +126,8 @@ def path_of(rover: Rover, poses: Floats, spacing: float) -> Floats:
     """Return poses (n, 3) as a path: two that are far apart are its start and goal."""
     if len(poses) != 2 or distance_along(poses)[-1] < ENDS_APART * rover.wheelbase:
         return np.asarray(poses)
-    return generate_candidates(*poses, count=1, waypoint_spacing=spacing)[0]
+    radius = tightest_radius(rover)
+    return generate_candidates(*poses, count=1, waypoint_spacing=spacing, min_radius=radius)[0]
 
 
 def _rank(remedy: Remedy) -> tuple[Any, ...]:

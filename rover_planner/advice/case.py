@@ -32,6 +32,8 @@ MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
 EDGE = 2.0
 """Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
+SPACING = 0.2
+"""Distance between waypoints of a path that advice makes anew [wheel radii]."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
 """Settings of the search of a path around."""
 
@@ -52,6 +54,11 @@ class Case:
     """Standard deviations by which the map's heights may be wrong."""
     accepted_chance: float = ACCEPTED_CHANCE
     """Largest chance of failure of a path that passes."""
+
+    @property
+    def spacing(self) -> float:
+        """Distance between waypoints of a path that is made anew [m]."""
+        return SPACING * self.rover.wheel.radius
 
     def change(self, **options: Any) -> "Case":
         """Return the case with other options."""
@@ -215,7 +222,10 @@ class JudgedCase:
         """Another path (n, 3) from start to goal that passes; None if none is found in time."""
         case = self.case
         options = PathQueryOptions(
-            model=case.options, map_sigmas=case.sigmas, accepted_chance=case.accepted_chance
+            waypoint_spacing=case.spacing,
+            model=case.options,
+            map_sigmas=case.sigmas,
+            accepted_chance=case.accepted_chance,
         )
         ends = case.poses[0], case.poses[-1]
         try:

@@ -39,8 +39,6 @@ LEVEL = 1e-9
 """Height by which an arm may be lower [m] because of rounding."""
 TELLING_MOVE = 0.01
 """Least move of the arm's tip along the body that is told [m]."""
-SPACING = 0.02
-"""Distance between waypoints of a path of its own where the refused one has no more [m]."""
 TORQUES = {OPTIMAL: "Switch on traction control", SERVO: "Drive the wheels by speed servos"}
 
 
@@ -217,7 +215,7 @@ def _reverse(case: Case, _refusal: JudgedCase, _value: Any) -> Case:
 def _spacing(case: Case) -> float:
     """Return the distance of waypoints [m] of a path of its own."""
     steps = np.diff(distance_along(case.poses))
-    return float(np.median(steps)) if (steps > 0.0).any() else SPACING
+    return float(np.median(steps)) if (steps > 0.0).any() else case.spacing
 
 
 def _with_path(change: Callable[[Case, JudgedCase, float], Any]) -> Callable[..., Case | None]:

@@ -45,8 +45,7 @@ def advise(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.advice.advise import STOPPED, grow_within, path_of, refuse
-    from rover_planner.advice.case import Case
-    from rover_planner.advice.levers import SPACING
+    from rover_planner.advice.case import SPACING, Case
     from rover_planner.command.prediction_files import read_poses
     from rover_planner.nodes.warm_up import search_paths
     from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
@@ -65,7 +64,7 @@ def advise(
         joint_angles=read_arm_angles(model, arm or ()),
         payload=payload,
     )
-    path = path_of(model, read_poses(poses), SPACING)
+    path = path_of(model, read_poses(poses), SPACING * model.wheel.radius)
     case = Case(model, load_terrain(terrain, max_cells), path, options, sigmas, accepted_chance)
     advice = None
     try:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Learns the ground of a drive, measurement by measurement: friction, slip, resistance, sticking.
 
-It takes rows of measurements (`drive_log`) at any rate and thinks once a tenth of a second. The
-motion must be measured without the wheels: by visual odometry, or by a simulator.
+It takes rows of measurements (`drive_log`) at any rate and thinks once a tenth of a second, more
+often for a fast rover. The motion must be measured without the wheels: by visual odometry, or by a
+simulator.
 """
 
 import math
@@ -28,11 +29,11 @@ from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from rover_planner.learning.stuck_watch import StuckWatch
 from rover_planner.learning.wheel_health import RATE, WheelHealth
 from rover_planner.learning.wheel_slip import (
-    BLOCK,
     LONGEST_GAP,
     WINDOW,
     SlipWindow,
     SlipWindows,
+    find_block_duration,
     find_median,
 )
 
@@ -169,6 +170,7 @@ class GroundLearner:
         self._stuck = StuckWatch(rover.nominal_speed, wheel.max_torque)
         self._health = WheelHealth(self._sense.weight, wheel.max_torque)
         self._block, self._block_end = np.zeros(1, _SUMS), np.inf
+        self._block_duration = find_block_duration(rover)
         self._turned = np.zeros(WHEEL_COUNT)
         self._forward = np.ones(WHEEL_COUNT)
         self._slipping = np.zeros(WHEEL_COUNT, dtype=int)
@@ -214,7 +216,7 @@ class GroundLearner:
             new = self._think(self._block[0])
             self._block_end = np.inf
         if self._block_end == np.inf:
-            self._block, self._block_end = np.zeros(1, _SUMS), time + BLOCK
+            self._block, self._block_end = np.zeros(1, _SUMS), time + self._block_duration
         _add(row, elapsed, self._rates, self._turned, self._block)
         return new
 
@@ -252,7 +254,7 @@ class GroundLearner:
         window = self._windows.take(float(row[TIME]), block["turned"] / count, state)
         if window is None:
             return False
-        elapsed = window.time - self.window.time if self.window else BLOCK
+        elapsed = window.time - self.window.time if self.window else self._block_duration
         self.window = window
         classes = self.ground.classes_at(window.places)
         for number in set(classes[np.isfinite(classes)].astype(int).tolist()):

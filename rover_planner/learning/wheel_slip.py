@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slip of the wheels over the last half second, from motion not measured at the wheels.
 
-Measurements are averaged over blocks of a tenth of a second, or one sample if these come less
-often. Slopes of straight lines through the blocks of a window are the speeds. The scatter about
-the lines tells how well they are known.
+Measurements are averaged over blocks of a tenth of a second, less for a fast rover, or one sample
+if these come less often. Slopes of straight lines through the blocks of a window are the speeds.
+The scatter about the lines tells how well they are known.
 """
 
 from dataclasses import dataclass
@@ -16,10 +16,14 @@ from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
+from rover_physics.rover.model import Rover
 from rover_planner.learning.contact_sense import WHEEL_STATE
 
 BLOCK = 0.1
-"""Duration of a block [s]."""
+"""Longest duration of a block [s]."""
+BLOCK_WAY = 0.08
+"""Longest way of a block at the rover's nominal speed [wheel radii]: the ground below a wheel must
+hardly change in a window."""
 WINDOW = 6
 """Number of blocks of a window."""
 MAX_TURN = 0.15
@@ -235,6 +239,11 @@ def _average(wheel, blocks, half_width, fit):
     fit.clear[wheel] = clear if most - least < MAX_TURN else 0.0
     fit.scrub[wheel] = half_width * (left - right) / (blocks[WINDOW - 1].time - blocks[0].time)
     fit.uneven[wheel] = abs(fit.travel[wheel]) * (steep - level)
+
+
+def find_block_duration(rover: Rover) -> float:
+    """Return the duration of a block [s]."""
+    return min(BLOCK, BLOCK_WAY * rover.wheel.radius / rover.nominal_speed)
 
 
 def find_median(values: Floats) -> Floats:

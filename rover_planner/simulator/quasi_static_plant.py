@@ -45,8 +45,9 @@ CREEP = 1e-4
 """Speed below which the rover does not steer [m/s]."""
 HELD = 1e-5
 """Speed below which the gears hold the rover [m/s]; else it would creep for ever."""
-MIN_PROGRESS, PATIENCE = 0.02, 2.0
-"""A rover that moves less than MIN_PROGRESS [m] within PATIENCE [s] counts as stuck."""
+MIN_PROGRESS, PATIENCE = 1.0 / 3.0, 2.0
+"""A rover that moves less than MIN_PROGRESS of its way at nominal speed within PATIENCE [s] counts
+as stuck."""
 
 
 class QuasiStaticPlant:
@@ -214,7 +215,8 @@ class QuasiStaticPlant:
         assert forces is not None
         saturated = np.abs(self._torques) >= 0.999 * self._rover.wheel.max_torque
         moved = float(np.hypot(*(self._pose - self._anchor)[:2]))
-        if moved > MIN_PROGRESS or not (forces.sliding.any() or saturated.any()):
+        least = MIN_PROGRESS * self._rover.nominal_speed * PATIENCE
+        if moved > least or not (forces.sliding.any() or saturated.any()):
             self._anchor, self._stalled = self._pose.copy(), 0.0
             return
         self._stalled += duration

@@ -108,7 +108,9 @@ class Simulation:
         steering = rover.steering
         # From one limit to the other, while the rover stands.
         longest = 0.0 if steering is None else 2.0 * steering.limit / steering.rate
-        self._follower, self.at_end = SecondTry(follower, tries, STUCK_TIME + longest), False
+        patience = STUCK_TIME + longest
+        self._follower = SecondTry(follower, rover.wheel.radius, tries, patience)
+        self.at_end = False
 
     def take_speeds(self, speed: float, yaw_rate: float, now: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] from time `now` [s]; ends path following."""

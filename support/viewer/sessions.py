@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths, grounds, sessions and slow scenarios for tests of the viewer."""
+"""Paths, grounds and sessions for tests of the viewer."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -152,12 +152,6 @@ def wait_for_rest(page: Any) -> None:
         "all judgements",
         PATIENCE,
     )
-
-
-def slow_scenario() -> Scenario:
-    """Return a scenario of three paths with so many waypoints that each takes a while."""
-    options = PathQueryOptions(count=3, spacing=0.2, waypoint_spacing=5e-5)
-    return Scenario(LSR1, LSR1, make_terrain(waves), START, GOAL, options)
 
 
 @contextmanager

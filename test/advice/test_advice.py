@@ -8,7 +8,8 @@ from itertools import permutations, takewhile
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, judge_path
+from rover_physics import SweepOptions, Terrain, judge_path
+from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.advice import case as case_module
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
@@ -18,8 +19,9 @@ from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
+from rover_planner.planning.path_geometry import distance_along
 from support.grounds import make_terrain, rock_left
-from support.rovers import LSR1
+from support.rovers import FIXED, LSR1, M2020, similar
 
 S = np.arange(-1.5, 1.6, 0.05)
 STRAIGHT = np.column_stack([S, 0.0 * S, 0.0 * S])
@@ -153,6 +155,15 @@ def test_two_poses_far_apart_are_start_and_goal():
     assert path_of(LSR1, near, 0.02).shape == (2, 3)
 
 
+@pytest.mark.parametrize("rover", [LSR1, M2020, FIXED], ids=["lsr1", "m2020", "fixed"])
+def test_the_path_between_start_and_goal_has_the_tightest_curve_of_the_rover(rover):
+    ends = np.array([[0.0, 0.0, 0.0], [-rover.wheelbase, 0.0, 0.0]])
+    path = path_of(rover, ends, 0.01)
+    turned = np.abs(np.diff(np.unwrap(path[:, 2])))
+    radius = np.diff(distance_along(path)).max() / turned.max()
+    assert radius == pytest.approx(tightest_radius(rover), rel=0.02)
+
+
 def test_energy_and_time_are_above_those_of_the_path_as_if_it_went_on():
     """The path fails at its first waypoint, so that nothing lies before it."""
     case = refused_by(slope, friction=0.45)
@@ -195,3 +206,17 @@ def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):
     assert not coarse.found and coarse.tried == fine.tried == ("curve",)
     (setting,) = fine.found[0].levers
     assert setting.value == pytest.approx(0.4, abs=0.04)
+
+
+@pytest.mark.parametrize("size", [0.25, 2.0])
+def test_the_way_around_is_as_long_for_the_size_of_the_rover(size):
+    def way_around(size: float) -> float:
+        rover = similar(LSR1, size)
+        ground = make_terrain(rock_left, half=3.0)
+        x, y = ground.origin
+        ground = Terrain(size * ground.elevation, size * ground.resolution, (size * x, size * y))
+        poses = STRAIGHT * [size, size, 1.0]
+        path = Case(rover, ground, poses).judge().path_around
+        return distance_along(path)[-1]
+
+    assert way_around(size) == pytest.approx(size * way_around(1.0), rel=1e-3)

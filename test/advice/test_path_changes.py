@@ -6,14 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rover_planner.advice.path_changes import (
-    bend_path,
-    is_driven_ahead,
-    pass_by,
-    reverse_rover,
-    shift_path,
-    turn_path,
-)
+from rover_planner.advice import path_changes
 from rover_planner.planning.angles import wrap
 
 S = np.linspace(0.0, 8.0, 401)
@@ -30,9 +23,9 @@ def arc(bend: float) -> np.ndarray:
 
 
 CHANGES = {
-    "shift": lambda path, amount: shift_path(path, PLACE, amount, 0.8),
-    "turn": lambda path, amount: turn_path(path, PLACE, 0.4 * amount, 0.8),
-    "bend": bend_path,
+    "shift": lambda path, amount: path_changes.shift_path(path, PLACE, amount, 0.8),
+    "turn": lambda path, amount: path_changes.turn_path(path, PLACE, 0.4 * amount, 0.8),
+    "bend": path_changes.bend_path,
 }
 
 
@@ -52,20 +45,23 @@ def test_a_shifted_path_keeps_its_ends_and_is_driven_ahead(change, bend, offset)
 @given(bend=bends, offset=offsets)
 def test_a_shift_is_that_far_to_the_left_at_its_place(bend, offset):
     path = arc(bend)
-    for changed in (shift_path(path, PLACE, offset, 0.8), bend_path(path, offset)):
+    for changed in (
+        path_changes.shift_path(path, PLACE, offset, 0.8),
+        path_changes.bend_path(path, offset),
+    ):
         x, y, yaw = path[PLACE]
         dx, dy = changed[PLACE, :2] - (x, y)
         assert dy * np.cos(yaw) - dx * np.sin(yaw) == pytest.approx(offset, abs=1e-9)
 
 
 def test_there_is_no_room_for_a_shift_at_an_end():
-    assert shift_path(arc(0.0), 30, 0.3, 0.8) is None
-    assert turn_path(arc(0.0), 390, 0.3, 0.8) is None
+    assert path_changes.shift_path(arc(0.0), 30, 0.3, 0.8) is None
+    assert path_changes.turn_path(arc(0.0), 390, 0.3, 0.8) is None
 
 
 def test_a_rover_that_turns_round_is_at_the_same_places_and_ends_as_it_began():
     path = arc(0.1)
-    turned = reverse_rover(path, 0.1)
+    turned = path_changes.reverse_rover(path, 0.1)
     np.testing.assert_allclose(turned[0], path[0])
     np.testing.assert_allclose(turned[-1, :2], path[-1, :2])
     assert wrap(turned[-1, 2] - path[-1, 2]) == pytest.approx(0.0, abs=1e-9)
@@ -73,12 +69,12 @@ def test_a_rover_that_turns_round_is_at_the_same_places_and_ends_as_it_began():
 
 
 def test_a_path_past_a_place_goes_there_and_on():
-    path = pass_by(arc(0.0), PLACE, 0.5, 0.6, 0.02)
+    path = path_changes.pass_by(arc(0.0), PLACE, 0.5, 0.6, 0.02)
     assert np.hypot(*(path[:, :2] - (4.0, 0.5)).T).min() < 1e-9
     np.testing.assert_allclose(path[[0, -1]], arc(0.0)[[0, -1]], atol=1e-9)
 
 
 def test_turns_on_the_spot_and_reverse_driving_are_not_driven_ahead():
-    assert is_driven_ahead(arc(0.1))
-    assert not is_driven_ahead(reverse_rover(arc(0.1), 0.1))
-    assert not is_driven_ahead(arc(0.1) + np.array([0.0, 0.0, np.pi]))
+    assert path_changes.is_driven_ahead(arc(0.1))
+    assert not path_changes.is_driven_ahead(path_changes.reverse_rover(arc(0.1), 0.1))
+    assert not path_changes.is_driven_ahead(arc(0.1) + np.array([0.0, 0.0, np.pi]))

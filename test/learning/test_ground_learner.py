@@ -126,6 +126,17 @@ def test_torques_that_fluctuate_prove_no_friction_by_chance():
     assert learn(rows).estimate.friction.low < SLOPE
 
 
+@pytest.mark.parametrize("speed", [0.02, 0.06, 0.6])
+def test_slip_over_a_short_way_is_seen_at_any_speed(speed):
+    rover, way = replace(ROVER, nominal_speed=speed), 0.15
+    rows = climb(rover, SLOPE, 1.2 / speed, speed)
+    rows[(rows[:, X] > 0.0) & (rows[:, X] < way), RATES] *= 1.6
+    learner = GroundLearner(rover, ramp(SLOPE))
+    for row in rows:
+        learner.take(row)
+    assert learner.estimate.slip_time == pytest.approx(0.6 / speed, abs=way / speed)
+
+
 def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     rows = climb(ROVER, SLOPE, 20.0)[::5]
     rows = np.delete(rows, slice(60, 80), axis=0)

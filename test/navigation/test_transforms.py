@@ -170,8 +170,7 @@ def test_what_is_stale_or_missing_is_refused_with_its_age():
         world.find("front_camera", 12 * SECOND, 13 * SECOND)
     world.frames.apply_timeout(5.0)
     assert_same(
-        world.find("front_camera", 12 * SECOND, 13 * SECOND),
-        Rigid.from_rpy(*HERE).then(MOUNT),
+        world.find("front_camera", 12 * SECOND, 13 * SECOND), Rigid.from_rpy(*HERE).then(MOUNT)
     )
     with pytest.raises(TransformError, match=r"is in frame 'moon'; it must be in 'map', or"):
         world.find("moon", None, SECOND)

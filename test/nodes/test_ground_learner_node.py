@@ -19,12 +19,7 @@ from msg_adapters.stamps import ns_to_stamp
 from rover_physics import Terrain, load_rover
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
-from rover_planner.nodes.ground_learner import (
-    EMERGENCY_STOP,
-    ESTIMATE,
-    MARK_PLACE,
-    GroundLearnerNode,
-)
+from rover_planner.nodes import ground_learner
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
@@ -49,10 +44,10 @@ class Rover(Node):
         kinds = {"joint_states": JointState, "odometry": Odometry, "cmd_vel": TwistStamped}
         kinds["imu"] = Imu
         self._senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
-        self.estimates = hear(self, String, ESTIMATE, latched_qos())
+        self.estimates = hear(self, String, ground_learner.ESTIMATE, latched_qos())
         self.wheels = hear(self, Odometry, "ground_learner/odometry", sensor_qos())
-        self.marks = hear(self, String, MARK_PLACE, latched_qos())
-        self.stops = hear(self, Bool, EMERGENCY_STOP, latched_qos())
+        self.marks = hear(self, String, ground_learner.MARK_PLACE, latched_qos())
+        self.stops = hear(self, Bool, ground_learner.EMERGENCY_STOP, latched_qos())
 
     @property
     def estimate(self) -> dict:
@@ -78,7 +73,7 @@ class Rover(Node):
         self._senders["odometry"].publish(odometry)
 
 
-def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
+def drive(node: ground_learner.GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
     """Send rows; the last of each few is sent again if it is lost on the way."""
     for begin in range(0, len(rows), AT_ONCE):
         some = rows[begin : begin + AT_ONCE]
@@ -99,7 +94,7 @@ def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
 
 
 def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place_marked(ros):
-    node = ros.start(GroundLearnerNode, stop_when_stuck=True, mark_when_stuck=True)
+    node = ros.start(ground_learner.GroundLearnerNode, stop_when_stuck=True, mark_when_stuck=True)
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     ground = ramp(SLOPE)
@@ -121,11 +116,11 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     wait_until(lambda: rover.stops == [Bool(data=True)], "the stop")
     wait_until(lambda: rover.estimate["stuck"], "that it is stuck")
     wait_until(lambda: rover.marks, "the mark")
-    place = parse_place(rover.marks[0].data, MARK_PLACE)
+    place = parse_place(rover.marks[0].data, ground_learner.MARK_PLACE)
     assert place.x - rows[60, X] == pytest.approx(place.radius, abs=0.01)
     assert "stays" in place.reason and place.date.startswith("2023-11-14")
     last = rover.estimate
     assert 6.0 < last["immobilised_time"] - BEGIN < 8.0
     assert last["friction"]["low"] > 0.5 * SLOPE
-    read = parse_learned(json.dumps(last), ESTIMATE)  # as a server does
+    read = parse_learned(json.dumps(last), ground_learner.ESTIMATE)  # as a server does
     assert read.classes.keys() == {7} and read.classes[7].low == pytest.approx(read.low)

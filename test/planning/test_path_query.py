@@ -6,22 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_planner.planning.path_query import (
-    PathQueryOptions,
-    answer_path_query,
-    check_path,
-    choose,
-)
+from rover_planner.planning import path_query
 from support.grounds import make_terrain
 from support.rough_grounds import with_std
 from support.rovers import LSR1
 
-COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
+COARSE = path_query.PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
 FLAT = make_terrain(lambda x, y: 0.0 * x)
 
 
 def test_level_ground_is_traversable_on_the_straight_connection():
-    answer = answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
+    answer = path_query.answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
     assert len(answer.candidates) == 5
     # all are equally safe; the straight one needs the least energy
     assert answer.traversable and answer.nearest == 0
@@ -32,7 +27,7 @@ def test_level_ground_is_traversable_on_the_straight_connection():
 
 def test_a_rock_in_the_way_is_driven_around():
     terrain = make_terrain(lambda x, y: np.where(np.hypot(x, y - 0.3) < 0.15, 0.5, 0.0))
-    answer = answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
+    answer = path_query.answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
     assert not answer.candidates[0].verdict.traversable
     assert answer.traversable and answer.nearest > 0
     assert answer.chosen.verdict.traversable
@@ -40,7 +35,7 @@ def test_a_rock_in_the_way_is_driven_around():
 
 def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
     terrain = make_terrain(lambda x, y: np.where(np.abs(x - 1) < 0.3, 1.0, 0.0))
-    answer = answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
+    answer = path_query.answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
     assert not answer.traversable
     assert answer.chosen.verdict.reason
     assert answer.chosen.verdict.reason in answer.explain()
@@ -49,7 +44,7 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
 
 
 def test_the_safer_path_wins_and_energy_decides_between_equals():
-    answer = answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
+    answer = path_query.answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
     risky, safe, thrifty = (
         replace(
             one,
@@ -60,9 +55,9 @@ def test_the_safer_path_wins_and_energy_decides_between_equals():
             answer.candidates, (0.5, 0.3, 0.31), (10.0, 90.0, 80.0), strict=False
         )
     )
-    assert choose((risky, safe, thrifty)).nearest == 2
+    assert path_query.choose((risky, safe, thrifty)).nearest == 2
     refused = replace(thrifty, verdict=replace(thrifty.verdict, traversable=False))
-    assert choose((risky, safe, refused)).nearest == 1
+    assert path_query.choose((risky, safe, refused)).nearest == 1
 
 
 def test_on_an_uncertain_map_the_bounds_are_the_risk():
@@ -70,7 +65,7 @@ def test_on_an_uncertain_map_the_bounds_are_the_risk():
 
     def risk_on(ground, sigmas):
         options = replace(COARSE, map_sigmas=sigmas)
-        return check_path(LSR1, ground, np.zeros((1, 3)), options).verdict.risk
+        return path_query.check_path(LSR1, ground, np.zeros((1, 3)), options).verdict.risk
 
     sure = risk_on(FLAT, 3.0)
     assert sure == risk_on(uncertain, 0.0) < risk_on(uncertain, 1.0) < risk_on(uncertain, 3.0) < 1

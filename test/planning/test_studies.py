@@ -11,14 +11,8 @@ from rover_physics.errors import RoverFileError
 from rover_physics.rover.rover_file import preset_names, rover_to_dict
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
+from rover_planner.studies import rover_values
 from rover_planner.studies.objectives import tallest_step, why_not_climbed
-from rover_planner.studies.rover_values import (
-    get_value,
-    list_values,
-    read_rover,
-    vary,
-    write_rover,
-)
 from rover_planner.studies.runner import describe_ties, find_rover, run_study
 from rover_planner.studies.study_file import study_from_dict
 from support.rovers import LSR1
@@ -43,7 +37,7 @@ def test_an_optimisation_finds_what_a_sweep_finds_without_ties():
     assert found.best.values[0] == pytest.approx(0.2, abs=0.02)
     assert found.ties == () and describe_ties(found) == ""
     keys = [parameter.keys[0] for parameter in found.study.parameters]
-    best = vary(found.study.rover, dict(zip(keys, found.best.values, strict=True)))
+    best = rover_values.vary(found.study.rover, dict(zip(keys, found.best.values, strict=True)))
     assert find_rover(found.study, found.best.values) == best
 
 
@@ -134,19 +128,19 @@ def test_an_impossible_study_is_refused(changes, text):
 @pytest.mark.parametrize("name", preset_names())
 def test_a_rover_that_is_written_and_read_again_is_the_same(name):
     rover = load_rover(name)
-    assert read_rover(write_rover(rover), "here") == rover
+    assert rover_values.read_rover(rover_values.write_rover(rover), "here") == rover
 
 
 @pytest.mark.parametrize("name", preset_names())
 def test_every_value_is_within_its_range_and_can_be_set(name):
     rover = load_rover(name)
     data = rover_to_dict(rover)
-    for values in list_values(rover).values():
+    for values in rover_values.list_values(rover).values():
         for value in values:
-            now = get_value(data, value.keys[0])
+            now = rover_values.get_value(data, value.keys[0])
             assert value.low <= now <= value.high and value.low < value.high, value.label
             assert value.label.endswith("]"), value.label
-            assert vary(rover, dict.fromkeys(value.keys, now)) == rover
+            assert rover_values.vary(rover, dict.fromkeys(value.keys, now)) == rover
 
 
 def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):

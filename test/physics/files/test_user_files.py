@@ -3,6 +3,7 @@
 
 import io
 import os
+import socket
 import struct
 import time
 import tracemalloc
@@ -22,7 +23,6 @@ from rover_physics.files.user_file import read_regular_file, write_file
 from rover_planner.command.prediction_files import read_poses, read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.studies.study_file import load_study
-from support.hostile_files import make_oddities
 
 MOST = 1_000_000
 DTYPES = ["f2", "f4", "f8", ">f4", ">f8", "i1", "i2", "i4", ">i8", "u1", "u8", "?", "<U3", ">U5"]
@@ -150,6 +150,24 @@ KINDS = {
     "loop": "Too many levels of symbolic links",
     "dangling": "No such file",
 }
+
+
+def make_oddities(folder: Path) -> list[str]:
+    """Make things that are no regular files in a folder; return their names, and worse names."""
+    os.mkfifo(folder / "pipe")
+    (folder / "folder").mkdir()
+    (folder / "loop").symlink_to(folder / "loop")
+    (folder / "dangling").symlink_to(folder / "nowhere")
+    (folder / "to_zero").symlink_to("/dev/zero")
+    with socket.socket(socket.AF_UNIX) as here:
+        here.bind(str(folder / "socket"))
+    return [
+        *(str(folder / name) for name in KINDS), "/dev/zero", "/dev/full", "/dev/stdin", "/proc",
+        "/proc/self/mem", "/proc/kmsg", "x" * 300, "x/" * 3000, "", ".", "..", "\n\x1b[2J", "é",
+        "\udcff", "a\0b", str(folder / "folder" / ".." / "nowhere"),
+    ]  # fmt: skip
+
+
 READERS = (load_rover, load_study, load_terrain, read_poses, read_prediction)
 
 

@@ -8,36 +8,28 @@ import pytest
 
 from rover_physics import RoverError
 from rover_physics.errors import RoverFileError
-from rover_physics.files.rules import (
-    Keys,
-    ListOfMappings,
-    Metres,
-    Rule,
-    Text,
-    choice,
-    interval,
-    number,
-)
+from rover_physics.files import rules
 from rover_physics.files.validation import describe, errors_of, read_as, show_key
 
 Point = Annotated[
-    tuple[Metres, Metres, Metres], Rule("a list of 3 numbers in m, [x, y, z] in the body frame")
+    tuple[rules.Metres, rules.Metres, rules.Metres],
+    rules.Rule("a list of 3 numbers in m, [x, y, z] in the body frame"),
 ]
 
 
 @dataclass(frozen=True)
 class Leg:
-    length: Annotated[float, number("m", above=0.0, most=2.0)]
-    swing: Annotated[tuple[float, float], interval("rad")] = (-1.0, 1.0)
+    length: Annotated[float, rules.number("m", above=0.0, most=2.0)]
+    swing: Annotated[tuple[float, float], rules.interval("rad")] = (-1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Walker:
-    name: Text
+    name: rules.Text
     hip: Point
-    gait: Annotated[str, choice("walk", "trot")]
-    legs: Annotated[tuple[Leg, ...], ListOfMappings()]
-    feet: Annotated[dict[str, float], Keys({"left": Metres}, {"right": Metres})]
+    gait: Annotated[str, rules.choice("walk", "trot")]
+    legs: Annotated[tuple[Leg, ...], rules.ListOfMappings()]
+    feet: Annotated[dict[str, float], rules.Keys({"left": rules.Metres}, {"right": rules.Metres})]
     tail: Leg | None = None
 
 

@@ -13,20 +13,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, judge_path, judge_poses
+from rover_physics.forces import soil as soil_model
 from rover_physics.forces.servo_balance import write_residual
 from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
 from rover_physics.forces.servo_search import CREEP
 from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import S, T, roll_wheel
-from rover_physics.forces.soil import (
-    SHEAR_MODULUS,
-    contact_length,
-    find_sinkage,
-    mobilised_share,
-    motion_resistance,
-    pack_soils,
-    shear_strength,
-)
 from rover_physics.numerics.records import new_record
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
@@ -208,7 +200,7 @@ def test_on_rough_soil_servos_drive_wherever_equal_torques_suffice(soil, curvatu
 
 BAND, FULL = 0.01, 0.2
 RADIUS, WIDTH, WEIGHT = 0.1, 0.1, 80.0
-SOILS = {name: pack_soils((name,))[-1] for name in SOFT}
+SOILS = {name: soil_model.pack_soils((name,))[-1] for name in SOFT}
 
 ways = st.floats(-1.5, 1.5)
 velocities = st.tuples(ways, ways, st.floats(-0.05, 0.05))
@@ -269,18 +261,20 @@ def test_forces_are_those_of_servo_and_friction_law(grip, velocity, droop, limit
 def soil_forces(soil, load, velocity, rim) -> tuple[np.ndarray, float]:
     """Return F_x, S, D and R over the weight at the speed of the rim, by the notes on soil."""
     row, N = SOILS[soil], load * WEIGHT
-    sinkage = find_sinkage(row, RADIUS, WIDTH, N)
-    length = contact_length(RADIUS, sinkage)
-    strength = shear_strength(row, WIDTH * length, N) / WEIGHT
+    sinkage = soil_model.find_sinkage(row, RADIUS, WIDTH, N)
+    length = soil_model.contact_length(RADIUS, sinkage)
+    strength = soil_model.shear_strength(row, WIDTH * length, N) / WEIGHT
     along, across, spin = velocity
     ends = []
     for way in (along + spin, along - spin):
         slide = np.array([rim - way, -across])
         size = np.hypot(*slide)
         slip = min(size / max(abs(rim), 1e-9), 1.0)
-        share = mobilised_share(slip * length / row[SHEAR_MODULUS])
+        share = soil_model.mobilised_share(slip * length / row[soil_model.SHEAR_MODULUS])
         ends.append(0.5 * strength * share * slide / max(size, 1e-12))
-    resistance = motion_resistance(row, WIDTH, sinkage) / WEIGHT * np.clip(along / BAND, -1, 1)
+    resistance = (
+        soil_model.motion_resistance(row, WIDTH, sinkage) / WEIGHT * np.clip(along / BAND, -1, 1)
+    )
     shear = np.array([ends[0][0] + ends[1][0], ends[0][1] + ends[1][1], ends[0][0] - ends[1][0]])
     return shear, resistance
 

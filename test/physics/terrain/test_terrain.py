@@ -16,12 +16,7 @@ from scipy.interpolate import RegularGridInterpolator
 from rover_physics import Terrain, load_rover, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.terrain.ground import (
-    BLOCK,
-    friction_at,
-    height_inside,
-    pack_ground,
-)
+from rover_physics.terrain.ground import BLOCK, friction_at, height_inside, pack_ground
 from rover_physics.terrain.terrain_file import terrain_presets
 
 

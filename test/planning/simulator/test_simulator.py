@@ -143,6 +143,21 @@ def test_a_rover_that_stands_is_not_computed_again_and_nothing_else_changes(monk
     assert same > 15
 
 
+@pytest.mark.parametrize("nominal", [0.003, 0.03, 1.0])
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_a_rover_stays_if_it_is_much_slower_than_its_own_speed(nominal, share):
+    """One motor saturates all the time, and the others brake against it."""
+    wheel = replace(LSR1.wheel, max_torque=0.5, max_speed=20.0)
+    rover = replace(LSR1, wheel=wheel, nominal_speed=nominal)
+    plant, against = QuasiStaticPlant(rover, LEVEL, (-2.0, 0.0, 0.0)), np.append(0.5, [-0.1] * 5)
+    for _ in range(150):
+        error = share * nominal - plant.state().velocity[0]
+        push = 2.0 * rover.total_mass * error * rover.wheel.radius
+        plant.pull(against + np.append(0.0, [push / 5.0] * 5), (nominal, 0.0), STEP)
+    assert plant.state().velocity[0] == pytest.approx(share * nominal, rel=0.3)
+    assert ("stay" in plant.state().stopped) == (share < 1.0 / 3.0)
+
+
 def test_drives_without_commands_are_braked():
     given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
     slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
@@ -191,11 +206,11 @@ def test_both_engines_drive_the_same_way():
     assert states[1].orientation == pytest.approx(states[0].orientation, abs=0.03)
 
 
-def drive_against_a_wall(follower, wall, duration):
-    """Return the positions along x of a rover that a wall stops `wall(attempt)` m ahead."""
+def drive_against_a_wall(follower, wall, duration, nominal=0.1):
+    """Return positions and speeds along x of a rover that a wall stops `wall(attempt)` m ahead."""
     x, attempt, track = 0.0, 0, []
     for step in range(int(duration / 0.1)):
-        speed, _ = follower.steer(np.array([x, 0.0, 0.0]), 0.1, 0.1 * step)
+        speed, _ = follower.steer(np.array([x, 0.0, 0.0]), nominal, 0.1 * step)
         attempt += bool(track) and speed < 0.0 <= track[-1][1]
         x = min(x + 0.1 * speed, max(wall(attempt), x + min(0.1 * speed, 0.0)))
         track.append((x, speed))
@@ -205,12 +220,23 @@ def drive_against_a_wall(follower, wall, duration):
 @pytest.mark.parametrize("wall_falls", [True, False])
 def test_a_rover_that_stands_still_backs_off_twice_and_then_gives_up(wall_falls):
     path = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    follower = SecondTry(PathFollower(path, 0.4))
+    follower = SecondTry(PathFollower(path, 0.4), LSR1.wheel.radius)
     passed = 2 if wall_falls else np.inf
     track = drive_against_a_wall(follower, lambda tries: 0.5 if tries < passed else 9.0, 90.0)
     assert follower.retries == 2 and follower.given_up != wall_falls
     assert follower.has_arrived(np.array([track[-1, 0], 0.0, 0.0])) == wall_falls
     assert wall_falls or (not track[-1, 1] and track[:, 0].max() == pytest.approx(0.5))
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0, 2.6])
+@pytest.mark.parametrize("nominal", [0.1, 0.01])
+def test_a_rover_of_any_size_and_speed_backs_off_by_as_many_wheel_radii(size, nominal):
+    radius, wall = 0.1 * size, 0.3 * size
+    path = size * np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    follower = SecondTry(PathFollower(path, 0.4 * size), radius)
+    track = drive_against_a_wall(follower, lambda _: wall, 70.0, nominal * size)[:, 0]
+    backed = wall - track[np.argmax(track >= wall - 1e-9) :].min()
+    assert backed == pytest.approx(1.2 * radius, abs=0.11 * nominal * size)
 
 
 def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_not_see_it():
@@ -372,7 +398,7 @@ def test_a_turn_by_more_than_half_a_circle_goes_the_way_of_the_path():
 
 def test_a_rover_that_stands_while_it_steers_is_given_its_time():
     path = PathFollower(turn_and_go(0.5, 1.0), LOOK_AHEAD, REACH)
-    follower = SecondTry(path, patience=30.0)
+    follower = SecondTry(path, LSR1.wheel.radius, patience=30.0)
     for step in range(299):
         assert follower.steer(np.zeros(3), SPEED, 0.1 * step) != (-SPEED, 0.0)
     assert not follower.retries
