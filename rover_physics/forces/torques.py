@@ -33,6 +33,10 @@ CENTRED = 0.1
 """Newton decrement at which the centre is accurate enough."""
 LEVEL_PRECISION = 5e-5
 """Relative precision of the smallest level."""
+TETHER = 0.01
+"""Stiffness that holds free forces, over the rover's weight, near equal torques where a barrier
+leaves them free: the loads of wheels between two faces grow without end with their tractions, and
+lateral forces against each other hardly change a load."""
 
 
 class SearchGoal(IntEnum):
@@ -173,6 +177,9 @@ def _write_barrier(balance, free, goal, level, search):
     """Write gradient and Hessian of the barrier of the set of `goal` at `level`."""
     search.H[:, :] = 0.0
     search.g[:, :] = 0.0
+    if goal != SearchGoal.FRICTION:
+        for k in range(free):
+            search.H[k, k], search.g[k, 0] = TETHER, TETHER * search.y[k]
     traction = level if goal == SearchGoal.TORQUE else search.max_traction
     for i in range(6):
         if goal == SearchGoal.FRICTION:

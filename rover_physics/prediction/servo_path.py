@@ -101,14 +101,17 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
 
     Where no speed balances, speed share and shares of friction and torque become those with which
     it rolls. A rover that stands, as while its wheels turn or climb, or runs against a face, has
-    no momentum. `gravity` is in [m/s^2].
+    no momentum. On the spot, speed and way are those of the outermost wheel. `gravity` is in
+    [m/s^2].
     """
     deficits = course.values("deficit")
     if not deficits.any():
         return
     share, motion = course.values("speed_share"), course.values("motion")
     ahead = course.values("contact_angle") * np.sign(course.values("wheel_speed"))
-    nominal = (motion[:, 0] ** 2 + motion[:, 1] ** 2) / (2.0 * gravity)
+    speed = np.hypot(motion[:, 0], motion[:, 1])
+    speed = np.where(speed > 0.0, speed, course.wheels.swing_radius * np.abs(motion[:, 2]))
+    nominal = speed**2 / (2.0 * gravity)
     distances = np.append(0.0, course.distances)
     stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
     head, carried = 0.0, np.zeros(len(deficits))

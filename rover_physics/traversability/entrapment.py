@@ -65,6 +65,8 @@ class Course:
     """(n,) True where the way back has to be judged, see `find_irreversible`."""
     drop: np.ndarray
     """(n,) largest drop of a wheel at a waypoint or since the one before [m]."""
+    direction: np.ndarray
+    """(n,) 1 where the rover drives forwards, -1 backwards, see `find_directions`."""
     swept: SweptPath | None
     """The sweep of the way in; None if it was not kept."""
 
@@ -74,8 +76,19 @@ def course_of(model: PackedModel, swept: SweptPath) -> Course:
     prediction = swept.prediction
     drop = prediction.wheel_drop.max(axis=1)
     return Course(
-        swept.path, prediction.distance, find_irreversible(model, prediction), drop, swept
+        swept.path,
+        prediction.distance,
+        find_irreversible(model, prediction),
+        drop,
+        find_directions(model, prediction),
+        swept,
     )
+
+
+def find_directions(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
+    """Return (n,) 1 where the rover drives forwards, -1 backwards; on the spot as the options."""
+    ahead = prediction.motion[:, 0]
+    return np.where(ahead == 0.0, model.options.direction, np.sign(ahead))
 
 
 def refuse_if_trapped(model: PackedModel, course: Course, verdict: Verdict) -> Verdict:
@@ -210,7 +223,7 @@ def _explain_no_way_on(model: PackedModel, course: Course, inside: slice) -> str
     ahead = np.linspace(0.0, length, steps + 1)
     closed = ""
     for start in starts:
-        for path in _paths_ahead(course.path[start], wheelbase, ahead, model.options.direction):
+        for path in _paths_ahead(course.path[start], wheelbase, ahead, course.direction[start]):
             # From the pose before it, so that the wheels of a curve are turned on the ground.
             poses = np.vstack([course.path[max(start - 1, 0)], path])
             verdict = _judge_escape(model, poses)

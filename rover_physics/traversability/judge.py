@@ -31,6 +31,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.entrapment import (
     Course,
     course_of,
+    find_directions,
     find_irreversible,
     refuse_if_trapped,
 )
@@ -275,7 +276,7 @@ class PartwiseJudge:
         self._poses = check_poses(poses)
         self._bends = None if curvature is None else check_curvature(curvature, len(self._poses))
         self._courses: list[tuple[np.ndarray, ...]] = []
-        """Of each part `distance`, `irreversible` and `drop` of its Course."""
+        """Of each part `distance`, `irreversible`, `drop` and `direction` of its Course."""
         self._codes: list[str] = []
         self._reasons: list[str] = []
         self._failure = (-1, "", "")
@@ -301,8 +302,10 @@ class PartwiseJudge:
         waypoint, code, reason = self._failure
         if self._bends is not None or code == "wheel_drop":
             return verdict
-        distance, irreversible, drop = map(np.concatenate, zip(*self._courses, strict=True))
-        course = Course(self._poses, distance, irreversible, drop, None)
+        distance, irreversible, drop, direction = map(
+            np.concatenate, zip(*self._courses, strict=True)
+        )
+        course = Course(self._poses, distance, irreversible, drop, direction, None)
         nominal = replace(verdict, first_failure=waypoint, code=code, reason=reason)
         asked = refuse_if_trapped(self._model, course, nominal)
         return verdict if asked is nominal else asked
@@ -318,7 +321,8 @@ class PartwiseJudge:
             new = slice(part.context, None)
             prediction = part.prediction.select(new)
             drop = prediction.wheel_drop.max(axis=1)
-            self._courses.append((prediction.distance.copy(), irreversible[new], drop))
+            directions = find_directions(model, prediction)
+            self._courses.append((prediction.distance.copy(), irreversible[new], drop, directions))
             verdict = with_refusals(verdict, verdict.codes[new], verdict.reasons[new])
             yield add_bounds(model, prediction, verdict, self._sigmas)
 

@@ -51,6 +51,10 @@ def advise(
     from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
     from rover_planner.shell.progress import show_progress
 
+    if picture is not None:
+        from rover_planner.figures.pictures import check_picture
+
+        check_picture(picture)
     model = load_rover(rover)
     options = SweepOptions(
         policy=policy,
@@ -87,7 +91,13 @@ def advise(
 
 
 def _write(out: Path, report: dict[str, Any]) -> None:
-    out.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    from rover_physics.files.user_file import write_file
+    from rover_physics.files.validation import errors_of
+    from rover_planner.errors import PlanningError
+
+    with errors_of(out, PlanningError):
+        contents = json.dumps(report, indent=1, allow_nan=False)
+        write_file(out, f"{contents}\n".encode())
 
 
 def _print_table(advice: "Advice") -> None:

@@ -3,6 +3,7 @@
 
 import gc
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -94,13 +95,6 @@ def predict(
     gc.enable()
     model = load_rover(rover)
     ground = load_terrain(terrain, max_cells)
-    if learned is not None:
-        from rover_planner.planning.learned_ground import lay_friction, read_learned
-
-        known = read_learned(learned)
-        told = model.friction if friction is None else friction
-        ground = lay_friction(ground, known.assume_classes(ground, told))
-        model = known.change(model)
     path = read_poses(poses)
     curvature = read_curvature(poses, len(path))
     options = SweepOptions(
@@ -115,6 +109,13 @@ def predict(
         tool_moment=tool_moment,
         backward=backward,
     )
+    if learned is not None:
+        from rover_planner.planning.learned_ground import lay_friction, read_learned
+
+        known = read_learned(learned)
+        told = model.friction if friction is None else friction
+        ground = lay_friction(ground, known.assume_classes(ground, told))
+        model, options = known.change(model), replace(options, friction=known.assume(told))
     assumed = assume(model, options, sigmas)
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")

@@ -13,6 +13,7 @@ from rover_planner.advice.levers import LEVERS
 from rover_planner.cli import main
 from rover_planner.planning.answering.budget import Budget
 from rover_planner.shell.run_program import EXIT_INTERRUPTED
+from support.command_line import assert_refused
 from support.grounds import make_terrain
 
 KEYS = {
@@ -92,4 +93,13 @@ def test_an_interruption_before_the_first_result_is_told(files, capsys, monkeypa
     monkeypatch.setattr(Budget, "check", interrupt)
     assert main(arguments(files)) == EXIT_INTERRUPTED
     assert capsys.readouterr().err == f"{STOPPED}\n"
+    assert not (files / "out.json").exists()
+
+
+def test_files_that_cannot_be_written_are_refused_as_bad_input(files, capfd):
+    words = arguments(files)
+    words[4] = str(files / "none" / "out.json")
+    assert_refused(capfd, main(words), "out.json: cannot be written")
+    picture = str(files / "none" / "out.png")
+    assert_refused(capfd, main(arguments(files, "--picture", picture)), "cannot be written")
     assert not (files / "out.json").exists()

@@ -123,6 +123,21 @@ def test_a_prediction_takes_what_was_learned(folder, capfd):
     assert_refused(capfd, main([*words, "--learned", str(learned)]), "learned.json")
 
 
+@pytest.mark.parametrize(("high", "assumed"), [(0.5, 0.4), (None, 0.7)])
+def test_a_prediction_assumes_what_was_learned_in_place_of_the_told_friction(
+    folder, high, assumed
+):
+    friction = {"mean": 0.4, "std": 0.1, "low": 0.3, "high": high}
+    (folder / "learned.json").write_text(json.dumps({"friction": friction}))
+    np.savez(folder / "poses.npz", poses=np.zeros((1, 3)))
+    words = predict_arguments(folder, terrain="ramp.npz")
+    words += ["--learned", str(folder / "learned.json"), "--friction", "0.7"]
+    assert main(words) == 0
+    with np.load(folder / "out.npz") as file:
+        np.testing.assert_allclose(file["friction"], assumed)
+        assert json.loads(str(file["assumptions"]))["friction"] == assumed
+
+
 def test_a_bag_tells_the_same_as_a_csv_file(folder, capfd):
     pytest.importorskip("rosbags", reason="install the extra bags")
     from rover_planner.ros.bags.bag_files import write_bag

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Connections of the start and the goal, which lie anywhere, to nodes of the lattice."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -19,7 +20,7 @@ from rover_planner.planning.search.nodes import HEADINGS, Nodes, nearest_heading
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 
 MAX_DISTANCE = 3.0
-"""Largest distance of a node that a curve leads to [cells]."""
+"""Distance within which nodes are looked for, unless the rover turns too widely for it [cells]."""
 MOST_CURVES = 16
 """Largest number of curves in each gear."""
 TURNED_PLACES = 4
@@ -92,8 +93,12 @@ class _Connector:
         Those of the backward gear are driven as if forwards, with all headings turned round.
         """
         is_behind = self.is_goal != (gear == Gear.BACKWARD)
-        nodes, there = _nodes_beside(self.nodes, self.end, -1.0 if is_behind else 1.0)
-        lengths = dubins_lengths(*self._order(there, gear), tightest_radius(self.rover))
+        radius, cell = tightest_radius(self.rover), self.nodes.cell
+        # An S to a line half a cell aside, and an arc by half the angle between headings.
+        bend = math.sqrt(2.0 * radius * cell) + radius * math.pi / HEADINGS
+        reach = max(MAX_DISTANCE * cell, bend)
+        nodes, there = _nodes_beside(self.nodes, self.end, reach, -1.0 if is_behind else 1.0)
+        lengths = dubins_lengths(*self._order(there, gear), radius)
         fits = lengths <= DETOUR * np.hypot(*(there - self.end)[:, :2].T) + 1e-9
         nodes, there, costs = nodes[fits], there[fits], PRICES[gear] * lengths[fits]
         return [
@@ -129,13 +134,15 @@ class _Connector:
         return found
 
 
-def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> tuple[NDArray[np.int64], Pose]:
-    """Return the nodes (n,) near a pose, ahead of it (side 1) or behind it (-1), hardly turned.
+def _nodes_beside(
+    nodes: Nodes, pose: Pose, reach: float, side: float
+) -> tuple[NDArray[np.int64], Pose]:
+    """Return the nodes (n,) within `reach` [m] ahead of a pose (side 1) or behind it (-1).
 
-    Their poses (n, 3) are the second.
+    They are hardly turned; their poses (n, 3) are the second.
     """
     ahead = side * np.array([np.cos(pose[2]), np.sin(pose[2])])
-    places = nodes.places_near(pose, MAX_DISTANCE * nodes.cell)
+    places = nodes.places_near(pose, reach)
     away = nodes.cell * (places + nodes.first) - pose[:2]
     distance = np.hypot(*away.T)
     places = places[(distance >= 1e-6) & (away @ ahead >= 0.5 * distance)]

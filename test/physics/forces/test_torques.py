@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import SweepOptions, find_torque_ranges, judge_path
+from rover_physics import SweepOptions, Terrain, find_torque_ranges, judge_path, judge_poses
 from support.best_torques import INSIDE, can_stand, solve_forces
 from support.reference_cases import reference_ground
-from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
+from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import balance_matrix
-from support.rovers import LSR1
+from support.rovers import LSR1, M2020
 
 STEP = reference_ground("settled_a/step")
 few = settings(max_examples=10)
@@ -43,6 +43,23 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
         assert not can_stand(LSR1, prediction, i, (used - 1e-4) / 1.005, max_torque)
         assert prediction.torque_saturation[i].max() <= 1.0 + 1e-9
     assert compared >= 2
+
+
+def test_forces_within_the_limits_are_found_where_equal_torques_lift_a_wheel():
+    """The rover m2020 turns on the spot, half of it on a bank across a side slope."""
+    x, y = np.meshgrid(*[np.arange(-40, 41) * 0.04] * 2)
+    heights = 0.2 * y + np.where(y > 0.0, np.clip(0.5 * x, 0.0, 0.2), 0.0)
+    bank = Terrain(heights, 0.04, (-1.6, -1.6))
+    ground, pose = scaled_for(M2020, bank, np.array([[0.4, 0.0, -1.178]]))
+    equal, optimal = (
+        judge_poses(M2020, ground, pose, [np.inf], SweepOptions(policy))[0]
+        for policy in ("equal", "optimal")
+    )
+    assert equal.wheel_loads.min() < 0.0
+    limits = M2020.wheel.max_torque, INSIDE
+    assert solve_forces(M2020, optimal, 0, np.zeros(12), *limits, shared=False).status == 0
+    assert optimal.wheel_loads.min() > 0.0
+    assert optimal.friction_utilisation.max() <= 1.0
 
 
 @few

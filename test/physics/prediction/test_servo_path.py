@@ -8,9 +8,9 @@ import pytest
 
 from rover_physics import SweepOptions, judge_path, judge_paths
 from support.grounds import make_terrain
-from support.paths import arc_of
+from support.paths import arc_of, poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import plane
+from support.rough_grounds import fractal, plane
 from support.rovers import FIXED, LSR1
 
 ROVER = unlimited(LSR1)
@@ -42,6 +42,14 @@ def test_lift_heights_are_the_sums_of_the_speeds():
     expected = 0.01 * (0.5 * (rates[1:] + rates[:-1])).sum()
     assert found.lift_height[end - 1, wheel] == pytest.approx(expected, rel=0.05)
     assert found.lift_height[end, wheel] == 0.0
+
+
+@pytest.mark.parametrize("max_torque", [0.1, 0.3])
+def test_a_turn_on_the_spot_that_weak_motors_do_not_brake_has_a_finite_speed(max_torque):
+    turn = poses_at(0.0, yaw=np.arange(0.0, 3.1, 0.05))
+    found = judge_path(LSR1, fractal(4), turn, replace(SERVO, max_torque=max_torque))[0]
+    assert (found.speed_share[found.settled] > 1.5).any()
+    assert np.isfinite(found.speed_share[found.settled]).all()
 
 
 def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged():

@@ -57,6 +57,17 @@ def test_a_step_down_to_open_ground_is_no_trap(policy):
     assert not verdict_on(UP, -1.2, 1.2, max_torque=0.5).traversable
 
 
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_rover_driven_tail_first_goes_on_tail_first_whether_or_not_the_options_say_so(backward):
+    def tail_first(ground, end, **arguments):
+        poses = poses_at(np.arange(-1.6, end, 0.01), yaw=np.pi)
+        options = SweepOptions(backward=backward, **arguments)
+        return judge_path(DEEP_DROPS, ground, poses, options)[1]
+
+    assert tail_first(HOLE, 0.1).code == "trapped"
+    assert tail_first(DOWN, 0.6, max_torque=0.5).traversable
+
+
 def test_an_end_below_an_edge_before_the_map_ends_is_a_trap():
     """Nobody can say that the way on is open."""
     ground = replace(DOWN, elevation=DOWN.elevation[:, :231])

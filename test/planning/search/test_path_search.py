@@ -265,3 +265,11 @@ def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
 def test_a_lattice_coarser_than_obstacles_is_warned_of():
     coarse = find_path(ask(make_terrain(waves)), replace(LONG, cell=0.5))
     assert "cell of 0.5 m is larger than 0.40 m" in coarse.warning
+
+
+def test_a_rover_that_turns_widely_reaches_a_goal_between_the_lines_of_the_lattice():
+    rover = replace(LSR1, steering=replace(LSR1.steering, limit=0.2))
+    question = ask(make_terrain(lambda x, y: 0.0 * x), (-1.0, 0.0, 0.0), (-1.0, 0.5, 0.0), rover)
+    answer = find_path(question, replace(LONG, cell=0.2))
+    assert answer.outcome == FOUND
+    np.testing.assert_allclose(answer.path.poses[-1], question.goal, atol=1e-9)
