@@ -144,8 +144,8 @@ class WheelOdometry:
             -s * aside, c * aside,  # way aside
             1.0, push, aside,  # ways of the piece
         ])  # fmt: skip
-        self._slides += raw * elapsed * np.array(
-            [[slide * c, slide * s], [-slide_aside * s, slide_aside * c]]
+        self._slides += (
+            raw * elapsed * np.array([[slide * c, slide * s], [-slide_aside * s, slide_aside * c]])
         )
         self._elapsed += elapsed
         self._way += abs(step)
