@@ -27,6 +27,9 @@ MAX_NEWTON_STEPS = 12
 STAY = 0.25
 """Fraction of the distance between old level and needed level that the new level keeps, so that
 the centre stays inside the set."""
+MOST_TRACTION = 10.0
+"""Largest torque over wheel radius [rover weights] that is looked for, whatever the limit: without
+a bound the centres run away along wheels that push against each other."""
 LOAD_KEPT = 1e-4
 """Least wheel load [rover weights] of a wheel on the ground."""
 CENTRED = 0.1
@@ -94,9 +97,10 @@ def minimise_friction(balance, max_traction, search):
         max_traction: Largest torque over wheel radius and rover weight.
         search: TORQUE_SEARCH; reads `mu` and `resistance`.
     """
-    found = _search(balance, np.int64(FREE_TORQUES), max_traction, search)
+    most = min(max_traction, MOST_TRACTION)
+    found = _search(balance, np.int64(FREE_TORQUES), most, search)
     if not found or _needed(search, SearchGoal.FRICTION) > 1.0:
-        _search(balance, np.int64(FREE_FORCES), max_traction, search)
+        _search(balance, np.int64(FREE_FORCES), most, search)
 
 
 @kernel

@@ -45,21 +45,35 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
     assert compared >= 2
 
 
-def test_forces_within_the_limits_are_found_where_equal_torques_lift_a_wheel():
-    """The rover m2020 turns on the spot, half of it on a bank across a side slope."""
+def turn_on_a_bank(options):
+    """Predict m2020 that turns on the spot, half of it on a bank across a side slope."""
     x, y = np.meshgrid(*[np.arange(-40, 41) * 0.04] * 2)
     heights = 0.2 * y + np.where(y > 0.0, np.clip(0.5 * x, 0.0, 0.2), 0.0)
     bank = Terrain(heights, 0.04, (-1.6, -1.6))
     ground, pose = scaled_for(M2020, bank, np.array([[0.4, 0.0, -1.178]]))
-    equal, optimal = (
-        judge_poses(M2020, ground, pose, [np.inf], SweepOptions(policy))[0]
-        for policy in ("equal", "optimal")
-    )
+    return judge_poses(M2020, ground, pose, [np.inf], options)[0]
+
+
+def test_forces_within_the_limits_are_found_where_equal_torques_lift_a_wheel():
+    equal, optimal = (turn_on_a_bank(SweepOptions(policy)) for policy in ("equal", "optimal"))
     assert equal.wheel_loads.min() < 0.0
     limits = M2020.wheel.max_torque, INSIDE
     assert solve_forces(M2020, optimal, 0, np.zeros(12), *limits, shared=False).status == 0
     assert optimal.wheel_loads.min() > 0.0
     assert optimal.friction_utilisation.max() <= 1.0
+
+
+@pytest.mark.parametrize("factor", [10.0, 1e3, 1e5])
+def test_a_torque_limit_that_no_wheel_comes_near_does_not_matter(factor):
+    """Equal torques lift a wheel there, so that the search starts far from the least friction."""
+    within, far = (
+        turn_on_a_bank(SweepOptions("optimal", max_torque=share * M2020.wheel.max_torque))
+        for share in (1.0, factor)
+    )
+    assert within.torque_saturation.max() < 0.9
+    assert far.friction_utilisation.max() == pytest.approx(
+        within.friction_utilisation.max(), rel=1e-3
+    )
 
 
 @few
