@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
 from rover_physics.chance.failure_chance import check_accepted_chance, find_failure_chance
-from rover_physics.names import EQUAL
+from rover_physics.limits.table import WHEEL_CONSTRAINTS
+from rover_physics.names import EQUAL, OPTIMAL
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.known_poses import KnownPoses
@@ -226,7 +227,7 @@ def add_bounds(
     if bounds is None:
         return prediction, verdict
     worst = refuse_worst_case(model.rover, prediction, bounds, verdict)
-    if model.options.kept_margin > 0.0:
+    if model.options.policy == OPTIMAL:
         worst = _pass_with_equal_torques(model, prediction, verdict, worst)
     return replace(prediction, bounds=bounds), worst
 
@@ -236,10 +237,13 @@ def _pass_with_equal_torques(
 ) -> Verdict:
     """Return the worst case without refusals of waypoints that equal torques pass in theirs.
 
-    `verdict` is the one without bounds, of which all refusals stay.
+    The bounds are those of one set of torques, and the best torques on the true ground are as good
+    as any set. `verdict` is the one without bounds, of which all refusals stay, as do those for
+    what the best torques do not better.
     """
     codes, reasons = list(worst.codes), list(worst.reasons)
-    rows = [i for i, code in enumerate(codes) if code and not verdict.codes[i]]
+    added = [i for i, code in enumerate(codes) if code and not verdict.codes[i]]
+    rows = [i for i in added if codes[i] in WHEEL_CONSTRAINTS]
     if not rows:
         return worst
     places, motions = prediction.poses[rows], np.ascontiguousarray(prediction.motion[rows])

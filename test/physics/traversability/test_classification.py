@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, classify_path, judge_path
+from rover_physics import SweepOptions, classify_path, judge_path, judge_poses
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
 from rover_physics.traversability.classification import (
@@ -22,7 +22,7 @@ from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import bowl, plane, random_poses, rocky, with_std
+from support.rough_grounds import bowl, fractal, plane, random_poses, rocky, with_std
 from support.rovers import LSR1
 
 POSE = [[0.0, 0.0, 0.0]]
@@ -171,6 +171,18 @@ def test_what_equal_torques_pass_needs_no_margin():
     classes = classify_path(LSR1, ground, poses, options)
     named = {i for i, c in enumerate(classes) if c.traversability_class == PASSABLE}
     assert named == passes[0]
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.2])
+def test_what_equal_torques_pass_at_worst_optimal_ones_do_too(margin):
+    ground, poses = with_std(fractal(1), 0.003), random_poses(1, 40, 0.6)
+    equal, optimal = (
+        judge_poses(LSR1, ground, poses, options=options)[1]
+        for options in (SweepOptions(friction=0.5), SweepOptions("optimal", margin, friction=0.5))
+    )
+    passed = [i for i, code in enumerate(equal.codes) if not code]
+    assert passed
+    assert [optimal.codes[i] for i in passed] == [""] * len(passed)
 
 
 def test_the_margin_holds_within_the_bounds_of_an_uncertain_map():
