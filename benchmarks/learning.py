@@ -260,8 +260,6 @@ def print_odometry(learned: list[Learned]) -> None:
     teacher, found = WheelOdometry(rover), defaultdict[tuple[str, ...], list[Any]](list)
     for one in learned:
         drive, recorded = one.drive, one.recorded
-        if not recorded.passed:
-            continue
         truth, rows = recorded.rows[:: drive.step], drive.add_noise(recorded.rows)
         yaw_rates = measure_yaw_rates(truth, drive.seed)
         told, known, pupil = (WheelOdometry(rover) for _ in range(3))
@@ -284,7 +282,8 @@ def print_odometry(learned: list[Learned]) -> None:
             nees = miss @ np.linalg.solve(odometry.covariance[:2, :2], miss)
             if one is not learned[0]:
                 sizes = np.hypot(*miss), np.hypot(*(plain - end))
-                found[drive.kind, name].append((*sizes, nees))
+                ground = drive.kind if recorded.passed else "not arrived"
+                found[ground, name].append((*sizes, nees))
         for row, yaw_rate in zip(rows, yaw_rates, strict=True):
             pupil.take(row, yaw_rate)
             pupil.learn(row[[log.X, log.Y, log.YAW]])

@@ -4,6 +4,7 @@
 import gc
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +19,9 @@ MAX_IN_MEMORY = 20_000
 except with classes or chances."""
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from rover_physics.traversability.torque_ranges import TorqueRanges
     from rover_physics.traversability.verdict import Verdict
 
@@ -155,6 +159,21 @@ def predict(
                 out, prediction, verdict, classes=found, ranges=find_ranges(), assumptions=assumed
             )
     typer.echo(f"wrote {out}: {_summarise(len(path), verdict)}")
+    if curvature is None:
+        _warn_of_long_steps(path, model.wheel.radius)
+
+
+def _warn_of_long_steps(path: "NDArray[np.float64]", longest: float) -> None:
+    """Warn of the longest step between poses (n, 3) if it is above a length [m]."""
+    steps = [math.dist(one[:2], other[:2]) for one, other in pairwise(path.tolist())]
+    step = max(steps, default=0.0)
+    if step > longest:
+        k = steps.index(step)
+        typer.echo(
+            f"warning: from waypoint {k} to {k + 1} it is {step:.2f} m; what lies between "
+            f"waypoints is looked at if they are at most a wheel radius apart, {longest:g} m",
+            err=True,
+        )
 
 
 def _summarise(count: int, verdict: "Verdict") -> str:

@@ -31,6 +31,9 @@ GYRO_NOISE, GYRO_BIAS = 2e-3, 1e-4
 HALF_SLIDE, SLIDE_SPREAD = 0.85, 0.1
 """Use of friction at which wheels that slide lose half of the way, and the standard deviation of
 its logarithm."""
+SIDE_SLIDE = 0.25
+"""Way aside over the way that wheels roll while they slide, on any ground: a face that the rover
+meets askew pushes it aside."""
 TRACTION_TIME = 0.5
 """Time over which the traction is averaged [s]: it jumps where wheels hop."""
 
@@ -89,7 +92,7 @@ class WheelOdometry:
         """Standard deviation of it [m/s]."""
         self.time, self.yaw_rate = math.nan, math.nan
         """Time [s] and yaw rate [rad/s] of the last row; NaN before the first."""
-        self._sums, self._slide = np.zeros(13), np.zeros(2)
+        self._sums, self._slides = np.zeros(13), np.zeros((2, 2))
         self._forward_ways, self._noise = self._sums[:8].reshape(2, 2, 2)
         self._side_way, self._piece_ways = self._sums[8:10], self._sums[10:]
         self._way = self._elapsed = 0.0
@@ -118,7 +121,7 @@ class WheelOdometry:
         pull = float(torques.sum()) / len(torques) * self._per_torque if len(torques) else slope
         self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
         push = self._traction if raw > 0.0 else -self._traction
-        slid, slide = self._find_slide(push, aside)
+        slid, slide, slide_aside = self._find_slide(push, aside)
         rolled = (1.0 - slid) * raw
         step = rolled * elapsed
         everywhere, per_push = self.forward.mean.tolist()
@@ -141,14 +144,18 @@ class WheelOdometry:
             -s * aside, c * aside,  # way aside
             1.0, push, aside,  # ways of the piece
         ])  # fmt: skip
-        self._slide += raw * elapsed * slide * np.array([c, s])
+        self._slides += (
+            raw * elapsed * np.array([[slide * c, slide * s], [-slide_aside * s, slide_aside * c]])
+        )
         self._elapsed += elapsed
         self._way += abs(step)
 
-    def _find_slide(self, push: float, aside: float) -> tuple[float, float]:
-        """Return the share of the way that sliding wheels lose, and its standard deviation.
+    def _find_slide(self, push: float, aside: float) -> tuple[float, float, float]:
+        """Return the share of the way that sliding wheels lose, with its standard deviation.
 
-        The share is that at the known friction, whose error is in the deviation.
+        The share is that at the known friction, whose error is in the deviation. The third number
+        is the standard deviation of the share that they go aside, where the ground falls: what
+        has no friction left slides that way.
 
         Args:
             push: What all wheels pull in the direction of the motion, over the weight.
@@ -157,8 +164,11 @@ class WheelOdometry:
         friction = max(self.friction, 1e-3)
         spread = math.hypot(SLIDE_SPREAD, self.friction_deviation / friction)
         likely = _chance_to_slide(push / friction, SLIDE_SPREAD)
-        possible = _chance_to_slide(math.hypot(push, aside) / friction, spread)
-        return likely, math.sqrt((possible - likely) ** 2 + possible * (1.0 - possible))
+        demand = math.hypot(push, aside)
+        possible = _chance_to_slide(demand / friction, spread)
+        deviation = math.sqrt((possible - likely) ** 2 + possible * (1.0 - possible))
+        share = max(SIDE_SLIDE, abs(aside) / max(demand, 1e-9))
+        return likely, deviation, math.copysign(possible * share, aside)
 
     def _find_speeds(self, row: Floats, turning: float) -> Floats:
         """Return the speeds of the body [m/s] that the wheels tell, those that were measured.
@@ -198,7 +208,7 @@ class WheelOdometry:
             self._noise
             + self._forward_ways @ self.forward.covariance @ self._forward_ways.T
             + self.side.covariance[0, 0] * np.outer(self._side_way, self._side_way)
-            + np.outer(self._slide, self._slide)
+            + self._slides.T @ self._slides
             + yaw / 3.0 * np.outer(across, across)
         )
         result[2, 2] = yaw

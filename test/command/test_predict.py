@@ -114,6 +114,16 @@ def test_a_refused_path_is_still_exit_code_0_with_the_reason_and_nan(files, capf
         assert np.isnan(out["wheel_loads"][-1]).all()
 
 
+def test_waypoints_that_are_far_apart_are_warned_of(files, capfd):
+    words = predict_arguments(files)
+    assert main(words) == 0 and "warning" not in capfd.readouterr().err
+    with np.load(files / "poses.npz") as file:
+        ends = file["poses"][[0, 1, -1]]
+    np.savez(files / "poses.npz", poses=ends)
+    assert main(words) == 0
+    assert "from waypoint 1 to 2" in capfd.readouterr().err
+
+
 def test_classes_and_torque_ranges_are_added_on_demand(files):
     assert main([*predict_arguments(files), "--classes", "--torque-ranges"]) == 0
     with np.load(files / "out.npz", allow_pickle=False) as out:

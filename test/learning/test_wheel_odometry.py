@@ -105,6 +105,14 @@ def test_a_rover_that_pushes_against_an_obstacle_with_all_friction_stands(deviat
     assert odometry.speed < SPEED
 
 
+def test_a_rover_that_slides_down_a_side_slope_may_be_where_it_slid(taught):
+    odometry, _ = follow(taught, 3, 0.0, 0.33, friction=0.34)
+    aside = odometry.pose[1] + 0.5 * odometry.pose[0] * np.array([-1.0, 1.0])
+    misses = np.column_stack([np.zeros(2), aside - odometry.pose[1]])
+    spread = np.linalg.solve(odometry.covariance[:2, :2], misses.T).T
+    assert ((misses * spread).sum(axis=1) < 5.99).all()
+
+
 @pytest.mark.parametrize("value", [0.9 * ROVER.wheel.max_torque, 1e3, -1e3, np.nan])
 def test_a_torque_that_cannot_be_believed_does_not_count(value):
     rng, way = np.random.default_rng(1), 200 / RATE * SPEED
