@@ -135,7 +135,7 @@ def test_steering_in_degrees_is_refused(folder, capfd):
 
 def test_a_prediction_takes_what_was_learned(folder, capfd):
     learned, out = folder / "learned.json", folder / "out.npz"
-    poses = np.column_stack([np.linspace(-1.0, 1.0, 9), np.zeros(9), np.zeros(9)])
+    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros(41), np.zeros(41)])
     np.savez(folder / "poses.npz", poses=poses)
     words = predict_arguments(folder, terrain="ramp.npz")
     used = {}
