@@ -69,7 +69,7 @@ def learn(
 
         check_picture(picture)
     rows = _read_log(log, model, odometry_topic)
-    check_angles(rows, model, log)
+    check_angles(rows, log)
     learner = GroundLearner(model, map_, told, soil)
     places, estimates = [], []
     with show_bar("learn", len(rows)) as step:

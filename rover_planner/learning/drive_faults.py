@@ -18,36 +18,35 @@ from rover_planner.learning.drive_log import (
     TIME,
 )
 from rover_planner.learning.wheel_slip import LONGEST_GAP, WINDOW, find_block_duration
-from rover_planner.traction.limits import MeasurementLimits
 
+MOST_SPIKES = 0.1
+"""Share of impossible angles up to which they are spikes of a sensor."""
 ROUNDING = 0.01
 """Angle by which a file may round half a turn or a quarter [rad]."""
+HALF, QUARTER = math.pi + ROUNDING, 0.5 * math.pi + ROUNDING
+LARGEST = (
+    ("roll", ROLL, HALF),
+    ("pitch", PITCH, QUARTER),
+    *((name, SUSPENSION.start + k, HALF) for k, name in enumerate(SUSPENSION_JOINTS)),
+    *((name, STEERING.start + k, HALF) for k, name in enumerate(STEERING_JOINTS)),
+)
+"""Angles of a row, their columns, and their largest magnitudes [rad]."""
 
 
-def check_angles(rows: Floats, rover: Rover, source: object) -> None:
-    """Check that a rover may have the angles of a drive; in degrees most drives have others.
-
-    Args:
-        rows: As in `drive_log`.
-        rover: The rover.
-        source: Name of the drive.
+def check_angles(rows: Floats, source: object) -> None:
+    """Check that a drive (n, columns), as in `drive_log`, is in radians; `source` is its name.
 
     Raises:
-        PlanningError: An angle that no rover of this kind has.
+        PlanningError: Many of its angles are impossible.
     """
-    joints = MeasurementLimits(rover).angles
-    half, quarter = math.pi + ROUNDING, 0.5 * math.pi + ROUNDING
-    columns = [("roll", ROLL, (-half, half)), ("pitch", PITCH, (-quarter, quarter))]
-    for names, first in ((SUSPENSION_JOINTS, SUSPENSION.start), (STEERING_JOINTS, STEERING.start)):
-        columns += [(n, first + k, joints[n]) for k, n in enumerate(names) if n in joints]
-    for name, column, (low, high) in columns:
+    for name, column, largest in LARGEST:
         values = rows[:, column]
-        wrong = np.flatnonzero((values < low) | (values > high))
-        if len(wrong):
-            at = rows[wrong[0], TIME]
+        wrong = np.abs(values) > largest
+        if wrong.sum() > MOST_SPIKES * np.isfinite(values).sum():
+            at = int(np.argmax(wrong))
             raise PlanningError(
-                f"{source}: {name} is {values[wrong[0]]:g} at {at:g} s; it must be in "
-                f"{low:.3g} to {high:.3g} rad"
+                f"{source}: {name} is {values[at]:g} at {rows[at, TIME]:g} s, and beyond "
+                f"{largest:.3g} rad in {wrong.mean():.0%} of the rows; angles must be in rad"
             )
 
 

@@ -33,17 +33,13 @@ class MeasurementLimits:
         fastest = MAX_WHEEL_RATE_RATIO * wheel.max_speed
         self._rates = dict.fromkeys(SUSPENSION_JOINTS, (-MAX_TURNING_RATE, MAX_TURNING_RATE))
         self._rates |= dict.fromkeys(WHEEL_JOINTS, (-fastest, fastest))
-        limits = {
+        self._angles = {
             name: suspension.rocker_limits if "rocker" in name else suspension.bogie_limits
             for name in SUSPENSION_JOINTS
         }
         if rover.steering is not None:
             limit = rover.steering.limit
-            limits |= dict.fromkeys(steering_joints(rover), (-limit, limit))
-        self.angles = {
-            name: (low - ANGLE_MARGIN, high + ANGLE_MARGIN) for name, (low, high) in limits.items()
-        }
-        """Smallest and largest possible angle of each suspension and steering joint [rad]."""
+            self._angles |= dict.fromkeys(steering_joints(rover), (-limit, limit))
         self._max_speed = wheel.max_speed * wheel.radius
         self._drive = SteeredDrive(rover)
 
@@ -51,16 +47,16 @@ class MeasurementLimits:
         self, positions: Mapping[str, float], velocities: Mapping[str, float]
     ) -> str:
         """Describe an impossible angle [rad] or rate [rad/s] of a joint of the rover."""
-        for kind, unit, values, bounds in (
-            ("position", "rad", positions, self.angles),
-            ("velocity", "rad/s", velocities, self._rates),
+        for kind, unit, values, bounds, margin in (
+            ("position", "rad", positions, self._angles, ANGLE_MARGIN),
+            ("velocity", "rad/s", velocities, self._rates, 0.0),
         ):
             for name, value in values.items():
                 low, high = bounds.get(name, (-math.inf, math.inf))
-                if not low <= value <= high:
+                if not low - margin <= value <= high + margin:
                     return (
                         f"joint_states has {kind} {value:g} of {name}; it must be in "
-                        f"{low:g} to {high:g} {unit}"
+                        f"{low - margin:g} to {high + margin:g} {unit}"
                     )
         return ""
 
