@@ -54,6 +54,7 @@ def learn(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.errors import PlanningError
+    from rover_planner.learning.drive_faults import check_angles, explain_nothing
     from rover_planner.learning.drive_log import X, Y
     from rover_planner.learning.ground_learner import GroundLearner
     from rover_planner.learning.learned_file import describe
@@ -68,6 +69,7 @@ def learn(
 
         check_picture(picture)
     rows = _read_log(log, model, odometry_topic)
+    check_angles(rows, log)
     learner = GroundLearner(model, map_, told, soil)
     places, estimates = [], []
     with show_bar("learn", len(rows)) as step:
@@ -78,10 +80,7 @@ def learn(
                     estimates.append(learner.estimate)
             step()
     if not places:
-        raise PlanningError(
-            f"{log}: nothing can be learned: the drive is not on the known part of the map, "
-            "or too short"
-        )
+        raise PlanningError(f"{log}: nothing can be learned: {explain_nothing(rows, model)}")
     with errors_of(out, PlanningError):
         contents = json.dumps(describe(learner.estimate, told), indent=1)
         write_file(out, f"{contents}\n".encode())

@@ -15,7 +15,7 @@ import socket
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.markup import escape
@@ -31,10 +31,13 @@ from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.known_map import describe_terrain
-from rover_planner.planning.goals import Mission, choose_mission
+from rover_planner.planning.goals import Mission, Pose, choose_mission
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+
+if TYPE_CHECKING:
+    from rover_planner.planning.path_query import PathAnswer
 
 COMPILER = "rover_physics.warm_up"
 """Module that compiles the kernels when it is run."""
@@ -291,12 +294,11 @@ def _draw(
     """Draw the picture; return how many verdicts agree with those computed here."""
     with steps.step("draw the picture") as status:
         from rover_planner.figures.plots import draw_answers
-        from rover_planner.planning.path_query import answer_path_query
 
         answered = []
         for goal in mission.goals:
             status.update(f"sweep the candidate paths to goal {goal.name} for the picture")
-            answer = answer_path_query(rover, ground, mission.start, goal.pose)
+            answer = answer_as_a_server(rover, ground, mission.start, goal.pose)
             answered.append((goal, answer))
         status.update("draw the picture")
         passable = sum(answer.traversable for _, answer in answered)
@@ -306,6 +308,20 @@ def _draw(
         own.traversable == answer["traversable"] and own.chosen.verdict.code == answer["code"]
         for (_, own), answer in zip(answered, answers, strict=True)
     )
+
+
+def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> "PathAnswer":
+    """Return the best candidate path, or if all are refused the one that a search finds."""
+    from rover_planner.planning.path_query import PathQueryOptions, add_path, answer_path_query
+    from rover_planner.planning.search.path_search import find_path
+    from rover_planner.planning.search.query import SearchQuery
+
+    options = PathQueryOptions()
+    answer = answer_path_query(rover, ground, start, goal, options)
+    if answer.traversable or not ground.contains(*goal[:2]):
+        return answer
+    found = find_path(SearchQuery(rover, ground, start, goal, options))
+    return answer if found.path is None else add_path(answer, found.path, np.array(goal))
 
 
 def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) -> Table:

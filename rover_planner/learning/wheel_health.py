@@ -8,7 +8,7 @@ from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
-from rover_planner.learning.drive_log import RATES, TIME, TORQUES
+from rover_planner.learning.drive_log import RATES, ROLL, SUSPENSION, TIME, TORQUES
 from rover_planner.learning.wheel_slip import SlipWindow
 
 RATE = "rate"
@@ -33,6 +33,8 @@ LEAST_EXCESS = 0.03
 TURNING_BACK = 0.3
 """Correlation of a wheel's rolling with minus its travel if its rate has the wrong sign."""
 _TORQUES, _RATES = TORQUES.start, RATES.start
+_ANGLES = slice(ROLL, SUSPENSION.stop)
+_HALF_TURN = 3.15  # rad, and what a file rounds
 _WATCH = record_type(
     ("last", float, (2, WHEEL_COUNT)),  # last torques [N m] and rates [rad/s]
     ("still", float, (2, WHEEL_COUNT)),  # time for which each has stood still or was missing [s]
@@ -53,11 +55,12 @@ class WheelHealth:
         self._backward = np.zeros(WHEEL_COUNT)
 
     def clean(self, row: Floats) -> Floats:
-        """Return a row of measurements without torques that no motor has."""
+        """Return a row without torques that no motor has and angles that no rover has."""
         spikes = np.abs(row[TORQUES]) > SPIKE * self._most
-        if spikes.any():
+        turned = np.abs(row[_ANGLES]) > _HALF_TURN
+        if spikes.any() or turned.any():
             row = row.copy()
-            row[TORQUES][spikes] = np.nan
+            row[TORQUES][spikes], row[_ANGLES][turned] = np.nan, np.nan
         return row
 
     def take(self, row: Floats) -> None:

@@ -16,8 +16,10 @@ from std_msgs.msg import Bool, String
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
+from msg_adapters.imu import ImuMounting
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import planar_odometry
+from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -64,7 +66,10 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             SoilFit(self._rover, 1.0, values.soil)  # refuses a name that is wrong
         self._told = values.friction or self._rover.friction
         known = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
-        self._rows = RowCollector(read_joint_map(values.joint_map, known))
+        self._rows = RowCollector(
+            read_joint_map(values.joint_map, known, values.steering_sign),
+            ImuMounting(values.imu_frame or BASE_FRAME, values.imu_mounting),
+        )
         self.learner: GroundLearner | None = None
         """The estimator; None before the first map."""
         self.heard_until = 0.0

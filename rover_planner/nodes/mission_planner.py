@@ -388,7 +388,8 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
     if terrain is not None:
         report({"event": "publishing the map"})
         node.publish_map(terrain)
-    codes = set()
+    codes: set[int] = set()
+    start: Sequence[float] = options.start
     for number, goal in enumerate(options.goal, start=1):
 
         def tell(text: str, goal: int = number) -> None:
@@ -396,11 +397,11 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
 
         tell("asking")
         asked = time.monotonic()
-        answer = node.ask(options.start, goal)
+        answer = node.ask(start, goal)
         answer["response_time"] = time.monotonic() - asked
         report({"event": "answer", "goal": number, "answer": answer})
         if options.advise and _was_judged(answer) and not answer["traversable"]:
-            advised = _take_advice(node, options.start, goal, tell)
+            advised = _take_advice(node, start, goal, tell)
             if advised is not None:
                 answer = advised
                 report({"event": "answer", "goal": number, "answer": answer})
@@ -409,7 +410,7 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
             tell("driving")
             try:
                 settings = DriveSettings(options.position_tolerance, options.heading_tolerance)
-                Drive(node, goal, settings, tell).run(answer["poses"])
+                start = Drive(node, goal, settings, tell).run(answer["poses"]).tolist()
             except NoAnswerError as error:
                 raise DriveFailedError(str(error)) from error
             tell("arrived")
@@ -417,7 +418,7 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
 
 
 def _take_advice(
-    node: MissionPlanner, start: Pose, goal: Pose, tell: Callable[[str], None]
+    node: MissionPlanner, start: Sequence[float], goal: Pose, tell: Callable[[str], None]
 ) -> dict[str, Any] | None:
     """Take the first remedy that needs nobody else; return the answer with it, None without."""
     advice = node.ask_advice()

@@ -33,7 +33,10 @@ class GroundLearnerParameters(ParameterTable):
     odometry_frame: str = parameter(
         "odom", "Frame of the wheel odometry on ~/odometry.", read_only=True
     )
+    steering_sign: str = shared.STEERING_SIGN
     joint_map: tuple[str, ...] = shared.JOINT_MAP
+    imu_frame: str = shared.IMU_FRAME
+    imu_mounting: tuple[float, ...] = shared.IMU_MOUNTING
     map_resolution: float = shared.MAP_RESOLUTION
     cell_height: str = shared.CELL_HEIGHT
     map_durability: str = shared.MAP_DURABILITY

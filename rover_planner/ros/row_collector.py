@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from msg_adapters.imu import imu_to_attitude
+from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import OWN_NAMES, JointNames
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -37,9 +37,15 @@ _EFFORTS = dict(zip(WHEEL_JOINTS, range(WIDTH)[TORQUES], strict=True))
 class RowCollector:
     """Gives a row for each odometry, with what was measured last."""
 
-    def __init__(self, names: JointNames = OWN_NAMES) -> None:
-        """Start without measurements; `names` are those of the joints in messages."""
+    def __init__(self, names: JointNames = OWN_NAMES, mounting: ImuMounting | None = None) -> None:
+        """Start without measurements.
+
+        Args:
+            names: Names of the joints in messages.
+            mounting: Of the IMU, as for `imu_to_attitude`.
+        """
         self._row, self._names, self._has_imu = np.full(WIDTH, np.nan), names, False
+        self._mounting = mounting
         self.yaw_rate = math.nan
         """Yaw rate by the IMU [rad/s]; NaN before it was measured."""
 
@@ -71,9 +77,9 @@ class RowCollector:
         """Take roll and pitch.
 
         Raises:
-            MessageError: It has no orientation.
+            MessageError: As `imu_to_attitude`.
         """
-        attitude = imu_to_attitude(message)
+        attitude = imu_to_attitude(message, self._mounting)
         self._row[[ROLL, PITCH]] = attitude.roll, attitude.pitch
         self._has_imu = True
         if attitude.rates is not None:

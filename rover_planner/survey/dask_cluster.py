@@ -3,8 +3,10 @@
 
 import contextlib
 import logging
+import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import Any
 
 from rover_planner.errors import PlanningError
@@ -106,16 +108,32 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
                 ) from None
             yield stack.enter_context(client)
             return
-        cluster = LocalCluster(
-            n_workers=settings.workers,
-            threads_per_worker=1,
-            memory_limit=settings.memory_limit or "auto",
-            dashboard_address=None,
-            scheduler_kwargs={"dashboard_address": ":0"},  # any port, so that several can run
-            silence_logs=logging.CRITICAL,
-        )
-        stack.enter_context(cluster)
+        with _ctrl_c_later():
+            cluster = LocalCluster(
+                n_workers=settings.workers,
+                threads_per_worker=1,
+                memory_limit=settings.memory_limit or "auto",
+                dashboard_address=None,
+                scheduler_kwargs={"dashboard_address": ":0"},  # any port, so that several can run
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
+
+
+@contextlib.contextmanager
+def _ctrl_c_later() -> Iterator[None]:
+    """Let Ctrl-C wait until the end of the block.
+
+    Threads and processes that start in it, and all that these start, never see it: a terminal
+    sends it to workers, too, which would print traces.
+    """
+    resource_tracker.ensure_running()  # it unblocks the signal in the thread that starts it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager

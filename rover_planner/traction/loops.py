@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Control loops around the torque allocation: speed, heading, slip, stall and torque rate."""
 
+import math
 from dataclasses import dataclass
 from statistics import median
 
@@ -44,6 +45,9 @@ FALL_TIME, REGROWTH_TIME = 0.1, 0.5
 """Time constants with which the largest push falls and grows again [s]."""
 MIN_PUSH_SHARE = 1e-3
 """Lower bound of the largest push, over its upper bound, from where it grows again."""
+SPEED_TIME, LONGEST_GAP = 0.5, 1.0
+"""Time over which the measured speed is averaged, and without positions before it begins anew [s]:
+wheels that hop move the body to and fro."""
 
 
 class PIController:
@@ -130,10 +134,39 @@ class WheelRates:
     """True if the ratios come from a map; from motion they may miss a face."""
     level_ratios: Floats
     """(6,) speeds of the wheels over their mean on level ground, 1 straight ahead."""
+    progress: float = 1.0
+    """Measured speed of the body over the wanted one; 1 where it is not known."""
+
+
+class BodySpeed:
+    """The mean speed of the body from measured positions."""
+
+    def __init__(self) -> None:
+        """Start without positions."""
+        self._time, self._place, self._velocity = -np.inf, np.zeros(2), np.zeros(2)
+        self._since = -np.inf
+
+    def take(self, place: Floats, time: float) -> None:
+        """Take a position (2,) [m] at a time [s]."""
+        elapsed = time - self._time
+        if 0.0 < elapsed < LONGEST_GAP:
+            velocity = (place - self._place) / elapsed
+            self._velocity += min(elapsed / SPEED_TIME, 1.0) * (velocity - self._velocity)
+        elif elapsed != 0.0:
+            self._velocity, self._since = np.zeros(2), time
+        self._time, self._place = time, np.array(place)
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s]; NaN before positions of SPEED_TIME."""
+        known = self._time - self._since > SPEED_TIME
+        return float(np.hypot(*self._velocity)) if known else math.nan
 
 
 class StallDetector:
     """Computes the share of speed servos in the torques of a stalled rover.
+
+    A rover is stalled if its wheels stand, or turn while its body stands.
 
     A wheel at a steep face whose contact angle is not estimated yet gets only the small torque of
     a wheel on level ground. Speed servos need no contact angles: each increases its torque until
@@ -160,7 +193,8 @@ class StallDetector:
         """
         delay = MAP_STALL_DELAY if motion.from_map else STALL_DELAY
         rate = median(motion.rates.tolist())
-        self.stalled = motion.wanted != 0.0 and rate / motion.wanted < STALL_RATIO
+        progress = min(rate / motion.wanted, motion.progress) if motion.wanted else 1.0
+        self.stalled = progress < STALL_RATIO
         change = duration / (TAKEOVER_TIME if self.stalled else -RELEASE_TIME)
         self._share = min(max(self._share + change, -delay), 1.0)
         moved = np.abs(motion.suspension_angles - self._seen).max()

@@ -37,6 +37,7 @@ from rover_planner.traction.loops import (
     HEADING_INTEGRAL_GAIN,
     MAX_PUSH,
     STALLED_GROWTH,
+    BodySpeed,
     PIController,
     PushLoop,
     SlipControl,
@@ -97,6 +98,7 @@ class TractionService:
         self.wanted = (0.0, 0.0)
         """Commanded speed [m/s] and yaw rate [rad/s], within what the rover can do."""
         self._pose, self._deviation = np.zeros(4), 0.0
+        self._body_speed = BodySpeed()
         self._finder: MapContactFinder | None = None
         self._last_time: float | None = None
         self._last: TractionAnswer | None = None
@@ -250,6 +252,7 @@ class TractionService:
     def take_odometry(self, pose: Floats, deviation: float, now: float) -> None:
         """Take x, y, z [m], yaw [rad] (4,), map frame, and the standard deviation of x, y [m]."""
         self._pose, self._deviation = pose, deviation
+        self._body_speed.take(pose[:2], now)
         self.monitor.take(ODOMETRY, now)
 
     def take_terrain(self, terrain: Terrain) -> None:
@@ -362,6 +365,14 @@ class TractionService:
         """Return the wanted mean speed of the wheels [m/s]."""
         return self.course.want(self.wanted, self.steering)[0]
 
+    def _find_progress(self) -> float:
+        """Return the measured speed over the wanted one; 1 where it is not known, or not asked."""
+        wanted, now = abs(self.wanted[0]), self._last_time
+        if wanted == 0.0 or now is None or not self.monitor.is_fresh(ODOMETRY, now):
+            return 1.0
+        speed = self._body_speed.speed
+        return speed / wanted if math.isfinite(speed) else 1.0
+
     def _find_push(self, duration: float) -> float:
         """Return the wanted push [N], from the mean travel of the wheels."""
         error = self._mean_wanted() - self.course.mean_of(self.joints.wheel_rates) * self._radius
@@ -405,7 +416,7 @@ class TractionService:
             motion = WheelRates(
                 ahead * self.joints.wheel_rates, course.sign * ahead * rows.wheel_speeds,
                 self.joints.suspension_angles, self._mean_wanted() / self._radius, self._from_map,
-                course.ratios,
+                course.ratios, self._find_progress(),
             )  # fmt: skip
             torques = ahead * self._slip.correct(ahead * torques, motion, duration)
         torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)

@@ -18,6 +18,7 @@ from support.command_line import assert_refused
 from support.project.checkout import TOP
 from support.project.processes import ProcessToken
 from support.ros_fixtures import DOMAINS, domain_id
+from support.rovers import LSR1
 from support.waiting import wait_until
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
@@ -42,6 +43,14 @@ def token(monkeypatch):
     for name, value in made.environment.items():
         monkeypatch.setenv(name, value)
     return made
+
+
+def test_the_picture_shows_the_path_that_a_server_searches_where_all_candidates_fail():
+    wall = np.zeros((81, 81))
+    wall[15:66, 39:42] = 1.0
+    ground, start, goal = Terrain(wall, 0.1, (-4.0, -4.0)), (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
+    answer = demo_module.answer_as_a_server(LSR1, ground, start, goal)
+    assert answer.traversable and np.abs(answer.chosen.poses[:, 1]).max() > 2.5
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.rover_file import save_rover
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
-from rover_planner.learning.drive_log import TIME
+from rover_planner.learning.drive_log import PITCH, ROLL, STEERING, SUSPENSION, TIME, X
 from support.command_line import assert_refused, predict_arguments
 from support.learning_drives import NAMES, climb, ramp, write_csv
 from support.rovers import LSR1 as ROVER
@@ -105,9 +105,48 @@ def test_a_bad_log_is_refused_in_one_line(folder, capfd, spoil, word):
     assert_refused(capfd, main(arguments(folder)), word)
 
 
+@pytest.mark.parametrize(
+    ("columns", "factor", "word"),
+    [
+        (ROLL, np.nan, "roll has no value"),
+        (SUSPENSION.stop - 1, np.nan, "bogie_left has no value"),
+        (TIME, 1e9, "rows are 2e+07 s apart; they must be 0.5 s or less, time in s"),
+        (TIME, 0.01, "lasts 0.07"),
+        (X, 1000.0, "known part of the map"),
+        (PITCH, 180.0 / np.pi, "pitch is -16"),
+    ],
+)
+def test_a_drive_that_teaches_nothing_says_why(folder, capfd, columns, factor, word):
+    rows = climb(ROVER, SLOPE, 8.0)
+    rows[:, columns] *= factor
+    write_csv(folder / "drive.csv", rows)
+    assert_refused(capfd, main(arguments(folder)), word)
+    assert not (folder / "out.json").exists()
+
+
+def test_steering_in_degrees_is_refused(folder, capfd):
+    rows = climb(ROVER, SLOPE, 8.0)
+    rows[20:, STEERING] = 30.0
+    write_csv(folder / "drive.csv", rows)
+    words = "rear_right_steering is 30 at 0.4 s, and beyond 3.15 rad in 95% of the rows"
+    assert_refused(capfd, main(arguments(folder)), words)
+
+
+def test_a_spike_of_an_angle_is_ignored(folder):
+    found = []
+    for spike in (None, 500.0):
+        rows = climb(ROVER, SLOPE, 8.0)
+        if spike is not None:
+            rows[200, PITCH], rows[300, SUSPENSION] = spike, -spike
+        write_csv(folder / "drive.csv", rows)
+        assert main(arguments(folder)) == 0
+        found.append(json.loads((folder / "out.json").read_text())["friction"]["mean"])
+    assert found[0] == pytest.approx(found[1], rel=0.02)
+
+
 def test_a_prediction_takes_what_was_learned(folder, capfd):
     learned, out = folder / "learned.json", folder / "out.npz"
-    poses = np.column_stack([np.linspace(-1.0, 1.0, 9), np.zeros(9), np.zeros(9)])
+    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros(41), np.zeros(41)])
     np.savez(folder / "poses.npz", poses=poses)
     words = predict_arguments(folder, terrain="ramp.npz")
     used = {}

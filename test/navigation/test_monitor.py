@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN
+from rover_planner.planning.learned_ground import LearnedGround
+from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.navigation.monitor import (
     ARRIVED,
     IDLE,
@@ -128,6 +130,31 @@ def test_the_rest_is_judged_once_for_each_map(service, monitor):
     service.settings = replace(settings, query=settings.query.change(friction=0.6))
     assert monitor.look(sight(service, STRAIGHT[10], 20.0)).judged == 3
     service.settings = settings
+
+
+def test_on_learned_ground_the_rest_is_judged_once_too():
+    learned = make_service(make_terrain(waves), learn="use")
+    learned.take_ground(LearnedGround(0.7, 0.05, 0.6, True))
+    monitor = PathMonitor()
+    monitor.take_path(WatchedPath(STRAIGHT), Sight(learned.snapshot(), STRAIGHT[0], 0.0))
+    looks = [Sight(learned.snapshot(), STRAIGHT[0], 10.0 * k) for k in range(3)]
+    assert [monitor.look(one).judged for one in looks] == [1] * 3
+    learned.take_ground(LearnedGround(0.05, 0.01, 0.03, True))
+    found = monitor.look(Sight(learned.snapshot(), STRAIGHT[0], 30.0))
+    assert found.state == STOPPED
+
+
+def test_a_place_that_is_marked_ahead_stops_and_one_behind_does_not(service, monitor):
+    marked = MarkedPlaces((MarkedPlace(-1.5, 0.0, 0.3, "stuck there", "today"),))
+    here = sight(service, STRAIGHT[100], 10.0)
+    behind = replace(here, snapshot=replace(here.snapshot, marked=marked))
+    assert monitor.look(behind).state == WATCHING
+    before = sight(service, STRAIGHT[0], 20.0)
+    monitor.take_path(WatchedPath(STRAIGHT), before)
+    assert monitor.look(before).state == WATCHING
+    ahead = replace(before, time=30.0, snapshot=replace(before.snapshot, marked=marked))
+    found = monitor.look(ahead)
+    assert (found.state, found.judgement.code) == (STOPPED, MARKED_CODE)
 
 
 def test_a_map_that_changes_all_the_time_leaves_time_for_others(service, monitor):

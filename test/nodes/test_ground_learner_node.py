@@ -16,7 +16,9 @@ from std_msgs.msg import Bool, String
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.sensing import imu_message
 from msg_adapters.stamps import ns_to_stamp
+from rover_physics import Rover as RoverModel
 from rover_physics import Terrain, load_rover
+from rover_physics.names import STEERING_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
 from rover_planner.nodes import ground_learner
@@ -66,11 +68,38 @@ class Rover(Node):
     def send(self, row: np.ndarray) -> None:
         """Send what a row holds; the joints first, which the row of the odometry has."""
         joints, odometry = row_messages(row, BEGIN)
-        self._senders["joint_states"].publish(joints)
+        self.send_joints(joints)
         attitude = xyzw_from_rpy(*row[[ROLL, PITCH, YAW]])
-        imu = imu_message(attitude, np.zeros(3), 3.7, 1e-3, odometry.header.stamp)
-        self._senders["imu"].publish(imu)
+        self.send_imu(attitude, np.zeros(3), odometry.header.stamp)
         self._senders["odometry"].publish(odometry)
+
+    def send_joints(self, joints: JointState) -> None:
+        """Send joint states."""
+        self._senders["joint_states"].publish(joints)
+
+    def send_imu(self, attitude, rates: np.ndarray, stamp, frame: str = "base_link") -> None:
+        """Send attitude (quaternion) and angular velocity (3,) [rad/s] of an IMU."""
+        imu = imu_message(attitude, rates, 3.7, 1e-3, stamp)
+        imu.header.frame_id = frame
+        self._senders["imu"].publish(imu)
+
+
+def curve_to_the_left(
+    rover: RoverModel, speed: float, yaw_rate: float, steering_sign: float
+) -> JointState:
+    """Return the joints of a rover that rolls a curve at a speed [m/s] and yaw rate [rad/s]."""
+    joints = JointState()
+    for name, wheel_joint, steering_joint in zip(
+        WHEELS, WHEEL_JOINTS, STEERING_JOINTS, strict=True
+    ):
+        axle, side = name.split("_")
+        x, y, _ = rover.suspension.wheels[axle]
+        ahead, left = speed - yaw_rate * (y if side == "left" else -y), yaw_rate * x
+        rolls = np.hypot(ahead, left) / rover.wheel.radius
+        joints.name = [*joints.name, wheel_joint, steering_joint]
+        joints.position = [*joints.position, 0.0, steering_sign * np.arctan2(left, ahead)]
+        joints.velocity = [*joints.velocity, rolls, 0.0]
+    return joints
 
 
 def drive(node: ground_learner.GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
@@ -124,3 +153,27 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     assert last["friction"]["low"] > 0.5 * SLOPE
     read = parse_learned(json.dumps(last), ground_learner.ESTIMATE)  # as a server does
     assert read.classes.keys() == {7} and read.classes[7].low == pytest.approx(read.low)
+
+
+def test_steering_and_imu_are_read_as_the_parameters_say(ros):
+    upside_down = (np.pi, 0.0, 0.0)
+    ros.start(
+        ground_learner.GroundLearnerNode,
+        steering_sign="right",
+        imu_frame="imu_link",
+        imu_mounting=list(upside_down),
+    )
+    rover = ros.spin(Rover(ros))
+    wait_until(rover.is_heard, "the node's subscriptions")
+    speed, yaw_rate = 0.05, 0.06
+    joints = curve_to_the_left(load_rover("lsr1"), speed, yaw_rate, steering_sign=-1.0)
+    for time_now in (BEGIN, BEGIN + 0.05):
+        rover.send_joints(joints)
+        stamp = ns_to_stamp(round(time_now * 1e9))
+        rates = np.array([0.0, 0.0, -yaw_rate])
+        rover.send_imu(xyzw_from_rpy(*upside_down), rates, stamp, "imu_link")
+        rover.send_imu(xyzw_from_rpy(0.0, 0.0, 0.0), rates, stamp, "camera")
+    wait_until(lambda: rover.wheels, "the odometry of the wheels")
+    twist = rover.wheels[-1].twist.twist
+    assert twist.angular.z == pytest.approx(yaw_rate)
+    assert twist.linear.x == pytest.approx(speed, rel=0.01)

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("distributed", reason="install the extra survey")
 
 from rover_planner.shell.run_program import END_SIGNALS
-from rover_planner.survey.dask_cluster import ClusterSettings
+from rover_planner.survey.dask_cluster import ClusterSettings, open_client
 from rover_planner.survey.runner import run_survey
 from rover_planner.survey.store import SurveyStore
 from rover_planner.survey.survey import prepare_survey
@@ -105,6 +105,17 @@ def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_p
     report = finish(start(*words))
     assert report["chunks_found"] == done and report["chunks_done"] == 9 - done
     assert_same_bits(layers_of(SurveyStore(out)), layers)
+
+
+def test_workers_do_not_see_ctrl_c_which_a_terminal_sends_to_all():
+    def blocks_ctrl_c() -> bool:  # sent by its code
+        import signal
+
+        return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+    with open_client(ClusterSettings(workers=2)) as client:
+        assert list(client.run(blocks_ctrl_c).values()) == [True, True]
+    assert not blocks_ctrl_c()
 
 
 def test_a_killed_worker_costs_only_its_chunks_time(whole, tmp_path):

@@ -7,10 +7,10 @@ import pytest
 from rover_planner.traction import loops
 
 
-def moves(rate, wanted=0.3, suspension=(0.0, 0.0, 0.0, 0.0)):
+def moves(rate, wanted=0.3, suspension=(0.0, 0.0, 0.0, 0.0), progress=1.0):
     """Return wheels that all turn at a rate."""
     rates, ratios = np.full(6, rate), np.ones(6)
-    return loops.WheelRates(rates, ratios, np.array(suspension), wanted, False, ratios)
+    return loops.WheelRates(rates, ratios, np.array(suspension), wanted, False, ratios, progress)
 
 
 def test_a_push_that_cannot_be_given_does_not_add_up():
@@ -41,6 +41,17 @@ def test_servos_take_over_only_where_the_rover_does_not_get_on():
         share = detector.update(moves(0.0), 0.1)
     assert share == 1.0
     assert detector.update(moves(0.3), 0.3) < 1.0
+
+
+def test_a_rover_that_stands_while_its_wheels_turn_is_stalled():
+    speed, detector = loops.BodySpeed(), loops.StallDetector()
+    rng, shares = np.random.default_rng(0), []
+    for k in range(200):
+        hops = 1e-3 * rng.standard_normal(2)
+        speed.take(np.array([min(k, 100) * 6e-4, 0.0]) + hops, 0.02 * k)
+        progress = speed.speed / 0.03 if np.isfinite(speed.speed) else 1.0
+        shares.append(detector.update(moves(0.3, progress=progress), 0.02))
+    assert max(shares[:101]) == 0.0 < shares[-1]
 
 
 def test_a_rover_that_climbs_slowly_is_left_to_the_program():

@@ -111,8 +111,8 @@ class Drive:
         self._stopped_at, self._stops = np.full(3, np.inf), 0
         self._trail: Poses = np.zeros((0, 3))
 
-    def run(self, poses: Sequence[Sequence[float]]) -> None:
-        """Drive a plan and those that follow it.
+    def run(self, poses: Sequence[Sequence[float]]) -> Poses:
+        """Drive a plan and those that follow it; return where the rover is at its end (3,).
 
         Raises:
             DriveFailedError: There is no path from where the rover is, it does not get on, or it
@@ -122,7 +122,7 @@ class Drive:
         for _ in range(MAX_PLANS):
             stretch = self._follow(plan)
             if not stretch.hindrance and not self._describe_miss(plan[-1], self._goal):
-                return
+                return stretch.pose
             plan = self._find_plan(stretch)
         raise DriveFailedError(f"the goal is not reached after {MAX_PLANS} plans")
 

@@ -22,6 +22,7 @@ from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
+from rover_planner.planning.marked_places import MarkedPlaces
 from rover_planner.planning.navigation.watched_path import Place, WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
 
@@ -120,7 +121,7 @@ class PathMonitor:
         self._drift = SuspensionDrift(DRIFT_TIME)
         self.finding = Finding(IDLE)
         """The last finding."""
-        self._judged_on: tuple[Terrain | None, ServiceSettings] | None = None
+        self._judged_on: tuple[Terrain | None, ServiceSettings, MarkedPlaces] | None = None
         self._pose_time = 0.0
         self._joints_time: float | None = None
         self._pause_end = 0.0
@@ -221,12 +222,12 @@ class PathMonitor:
         return refusal(SUSPENSION, reason)
 
     def _judge_rest(self, path: WatchedPath, sight: Sight) -> PathJudgement | None:
-        """Judge the rest of the path if map or settings are new; return it if it is refused."""
+        """Judge the rest if map, settings or marked places are new; return it if it is refused."""
         snapshot = sight.snapshot
         missing = snapshot.refuse_map()
         if missing is not None:
             return missing
-        judged_on = snapshot.terrain, snapshot.settings
+        judged_on = snapshot.terrain, snapshot.settings, snapshot.marked
         before = self._judged_on
         if before is not None and all(a is b for a, b in zip(before, judged_on, strict=True)):
             return None

@@ -113,10 +113,10 @@ class PathJudge:
                     answer, end = other, alternative
                     break
         offset = float(np.hypot(*(end - goal)[:2]))
-        return replace(self._hold(answer), goal=end, goal_offset=offset, alternatives_tried=tried)
+        return replace(answer, goal=end, goal_offset=offset, alternatives_tried=tried)
 
     def _query(self, start: Pose, goal: Pose) -> PathAnswer:
-        return answer_path_query(self.rover, self.terrain, start, goal, self.options)
+        return self._hold(answer_path_query(self.rover, self.terrain, start, goal, self.options))
 
     def _hold(self, answer: PathAnswer) -> PathAnswer:
         """Return an answer whose choice is among the candidates whose ground is not refused.

@@ -132,6 +132,7 @@ def test_a_rover_that_ends_beside_the_goal_or_turned_away_has_not_arrived(make_r
             return (0.0, 0.0) if self.has_arrived(pose) else super().steer(pose, speed)
 
     rover.make_follower = Short
-    Drive(rover, goal, SETTINGS, told.append).run(plan)
+    end = Drive(rover, goal, SETTINGS, told.append).run(plan)
     assert any("has ended 0.1" in what or "has stood" in what for what in told), told
     assert rover.plant.pose() == pytest.approx(goal, abs=0.1)
+    assert end == pytest.approx(rover.plant.pose())

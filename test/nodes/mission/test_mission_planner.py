@@ -3,6 +3,7 @@
 
 import json
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rclpy.node import Node
 from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
+from rover_planner.nodes import mission_planner
 from rover_planner.nodes.mission.drive import DriveFailedError
 from rover_planner.nodes.mission_planner import NoAnswerError, main
 from rover_planner.nodes.programs import MissionOptions, read_arguments
@@ -100,6 +102,21 @@ def test_answers_drives_and_refusals_have_exit_codes_of_their_own(start_server, 
     code, out, err = run_planner(NEAR, "--drive", "--timeout=4")  # there is no rover
     assert code == 1 and "goal 1: yes" in out
     assert "mission_planner: waited 4 s in vain for a rover on the topic path\n" in err
+
+
+def test_after_a_drive_the_next_goal_is_asked_for_from_where_the_rover_is(
+    start_server, run_planner, monkeypatch
+):
+    end = [-0.6, 0.05, 0.1]
+    arrived = SimpleNamespace(run=lambda _plan: np.array(end))
+    monkeypatch.setattr(mission_planner, "Drive", lambda *_: arrived)
+    server = start_server(planner="fan")
+    server.service.take_terrain(make_terrain(waves))
+    code, out, _ = run_planner(NEAR, "--goal=1,0,0", "--drive", "--json")
+    events = [json.loads(line) for line in out.splitlines()]
+    first, second = (event["answer"]["poses"] for event in events if event["event"] == "answer")
+    assert code == 0 and first[0] == pytest.approx([-2.0, 0.0, 0.0])
+    assert second[0] == pytest.approx(end)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky, waves
 from support.messages import send_map_odom
 from support.planner_client import GOAL, START, PlannerClient, ask, begin_plan
+from support.ros_fixtures import run_in_executor
 from support.waiting import wait_until
 
 AHEAD = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
@@ -98,6 +99,17 @@ def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):
     verdict = check(client, server, [[3.0, 0.0, 0.0], [6.0, 0.0, 0.0]])
     assert verdict["traversable"] is False and verdict["code"] == "off_map" and verdict["reason"]
     assert verdict["class_constraint"] == "off_map" and verdict["class_margin"] is None
+
+
+def test_results_are_those_of_the_rover_of_the_question(shared):
+    """Angles of a path of one rover had the wheel radius of the next one."""
+    server = shared.server
+    known = server.service.snapshot()
+    judged, about = known.answer(START, GOAL), server.desk.identify("can_traverse", "", known)
+    assert shared.client.set_parameter("rover", "m2020") == (True, "")
+    results = run_in_executor(server, lambda: server.publish(judged, about))
+    assert shared.client.set_parameter("rover", "lsr1") == (True, "")
+    assert results.rover is known.settings.rover
 
 
 def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, lasting):

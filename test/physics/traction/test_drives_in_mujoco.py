@@ -42,3 +42,10 @@ def test_a_side_slope_near_the_friction_is_crossed():
     """Upper wheels seemed to slip, and the rover slid down by a metre."""
     slope = Obstacle("cross_slope", 28.6, friction=0.652, max_torque=2.17)
     assert drive(slope, BY_MAP, tries=3, most_time=5.0).passed
+
+
+@pytest.mark.long
+def test_a_rover_whose_wheels_turn_at_a_wall_is_helped_by_its_speed_servos():
+    """While wheels hopped, the rover did not seem to be stalled, and stayed in the ditch."""
+    ditch = Obstacle("ditch", 0.3827, friction=0.938, max_torque=1.9468)
+    assert drive(ditch, BY_MAP, tries=3, most_time=5.0, timestep=0.003).passed

@@ -61,6 +61,15 @@ def test_a_path_into_a_marked_place_is_refused_with_reason_and_date(service):
     assert rim[0] == pytest.approx(PLACE.x - PLACE.radius, abs=0.1)
 
 
+def test_a_goal_in_a_marked_place_is_answered_with_one_near_it(service):
+    service.mark(MarkedPlace(1.0, 0.0, 0.3, "stuck there", "today"))
+    assert not service.snapshot().answer((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)).traversable
+    near = service.snapshot().answer((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), tolerance=0.8)
+    assert near.traversable and 0.3 < near.search.goal_offset <= 0.8
+    end = near.candidate.poses[-1]
+    assert np.hypot(end[0] - 1.0, end[1]) == pytest.approx(near.search.goal_offset)
+
+
 def test_a_rover_may_leave_a_place_but_not_go_on_into_it():
     marked = MarkedPlaces((PLACE,))
     pieces = [straight(1.3, 0.5), straight(1.3, 1.4), straight(1.6, 2.5), straight(1.3, 1.3)]
