@@ -193,6 +193,11 @@ class PathWatch:
             self._sight = Sight(snapshot, pose, time.monotonic())
             self._changed.notify_all()
 
+    @property
+    def _ends(self) -> bool:
+        """True if the node ends, so that what the thread calls may have ended before it."""
+        return self._life.stopped is not None or not self._node.context.ok()
+
     def _rehearse(self) -> None:
         """Look at a path of no meaning, unless that compiles kernels."""
         try:
@@ -201,7 +206,8 @@ class PathWatch:
         except (KernelMissingError, QuestionStoppedError):
             return
         except Exception as error:
-            self._node.guard.report("monitor", error)
+            if not self._ends:
+                self._node.guard.report("monitor", error)
 
     def _run(self) -> None:
         self._rehearse()
@@ -219,6 +225,8 @@ class PathWatch:
             except QuestionStoppedError:
                 return
             except Exception as error:
+                if self._ends:
+                    return
                 text = f"internal error: {self._node.guard.report('monitor', error)}"
                 finding = self._monitor.stop(refusal("internal_error", text))
             self._hand_over(finding, sight)
