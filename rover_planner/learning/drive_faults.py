@@ -10,6 +10,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
 from rover_planner.learning.drive_log import (
+    HALF_TURN,
     MOTION,
     PITCH,
     ROLL,
@@ -21,14 +22,11 @@ from rover_planner.learning.wheel_slip import LONGEST_GAP, WINDOW, find_block_du
 
 MOST_SPIKES = 0.1
 """Share of impossible angles up to which they are spikes of a sensor."""
-ROUNDING = 0.01
-"""Angle by which a file may round half a turn or a quarter [rad]."""
-HALF, QUARTER = math.pi + ROUNDING, 0.5 * math.pi + ROUNDING
 LARGEST = (
-    ("roll", ROLL, HALF),
-    ("pitch", PITCH, QUARTER),
-    *((name, SUSPENSION.start + k, HALF) for k, name in enumerate(SUSPENSION_JOINTS)),
-    *((name, STEERING.start + k, HALF) for k, name in enumerate(STEERING_JOINTS)),
+    ("roll", ROLL, HALF_TURN),
+    ("pitch", PITCH, HALF_TURN - 0.5 * math.pi),
+    *((name, SUSPENSION.start + k, HALF_TURN) for k, name in enumerate(SUSPENSION_JOINTS)),
+    *((name, STEERING.start + k, HALF_TURN) for k, name in enumerate(STEERING_JOINTS)),
 )
 """Angles of a row, their columns, and their largest magnitudes [rad]."""
 

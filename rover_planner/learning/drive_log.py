@@ -23,6 +23,8 @@ WIDTH = 46
 """Number of columns of a row."""
 MOTION = ("time", "x", "y", "yaw", "roll", "pitch", *SUSPENSION_JOINTS)
 """Names of the columns that a CSV file must have, beside rates and torques or currents."""
+HALF_TURN = 3.15
+"""Largest magnitude of an angle of a rover or its joints [rad], with what files round."""
 MAX_ROWS = 5_000_000
 """Largest number of rows of a file."""
 

@@ -8,7 +8,7 @@ from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
-from rover_planner.learning.drive_log import RATES, ROLL, SUSPENSION, TIME, TORQUES
+from rover_planner.learning.drive_log import HALF_TURN, RATES, ROLL, SUSPENSION, TIME, TORQUES
 from rover_planner.learning.wheel_slip import SlipWindow
 
 RATE = "rate"
@@ -34,7 +34,6 @@ TURNING_BACK = 0.3
 """Correlation of a wheel's rolling with minus its travel if its rate has the wrong sign."""
 _TORQUES, _RATES = TORQUES.start, RATES.start
 _ANGLES = slice(ROLL, SUSPENSION.stop)
-_HALF_TURN = 3.15  # rad, and what a file rounds
 _WATCH = record_type(
     ("last", float, (2, WHEEL_COUNT)),  # last torques [N m] and rates [rad/s]
     ("still", float, (2, WHEEL_COUNT)),  # time for which each has stood still or was missing [s]
@@ -57,7 +56,7 @@ class WheelHealth:
     def clean(self, row: Floats) -> Floats:
         """Return a row without torques that no motor has and angles that no rover has."""
         spikes = np.abs(row[TORQUES]) > SPIKE * self._most
-        turned = np.abs(row[_ANGLES]) > _HALF_TURN
+        turned = np.abs(row[_ANGLES]) > HALF_TURN
         if spikes.any() or turned.any():
             row = row.copy()
             row[TORQUES][spikes], row[_ANGLES][turned] = np.nan, np.nan
