@@ -4,6 +4,7 @@
 import json
 import math
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -105,17 +106,17 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         except RoverError as error:
             self.get_logger().warning(f"{CLOUD} not used: {error}", throttle_duration_sec=5.0)
 
-    def _take_command(self, twist: Any, _arrival: float) -> None:
-        self._commanded, self._command_time = twist_to_speeds(twist)[0], self.seconds
+    def _take_command(self, twist: Any, arrival: float) -> None:
+        self._commanded, self._command_time = twist_to_speeds(twist)[0], arrival
 
     def _read_sensors(self) -> None:
         """Take what the sensors sent, and tell where the wheels say that the rover is."""
         learner, wheels = self.learner, self._wheels
         if learner is not None:
-            is_fresh = self.seconds - self._command_time < COMMAND_AGE
+            is_fresh = time.monotonic() - self._command_time < COMMAND_AGE
             learner.commanded = self._commanded if is_fresh else None
         self.heard.poll()
-        if not wheels.time > self._wheels_told:
+        if not abs(wheels.time - self._wheels_told) > 0.0:
             return
         self._wheels_told = wheels.time
         message = planar_odometry(
@@ -160,7 +161,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
                 rolling = 0.0 if learner.window is None else learner.window.rolling.mean()
                 place = find_place_ahead(self._rover, row, rolling, stuck)
                 self._marks.publish(String(data=json.dumps(asdict(place))))
-        if now - self._sent >= PERIOD or bool(stuck) != bool(before):
+        if not 0.0 <= now - self._sent < PERIOD or bool(stuck) != bool(before):
             self._sent = now
             friction = learner.estimate.friction
             self._wheels.friction, self._wheels.friction_deviation = friction.mean, friction.std
