@@ -37,7 +37,7 @@ from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import latched_qos, newest_qos, polled_qos, sensor_qos
+from rover_planner.ros.qos import latched_qos, newest_qos, polled_qos, result_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.shell.kernels import load_kernels
@@ -78,7 +78,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._commanded, self._command_time, self._sent, self._stuck = 0.0, -1e9, -1e9, ""
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
-        self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
+        self._marks = self.create_publisher(String, MARK_PLACE, result_qos())
         self._wheels = WheelOdometry(self._rover)
         self._wheels_told = -math.inf  # time of the last odometry of the wheels that was sent
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
