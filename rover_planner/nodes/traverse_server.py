@@ -57,7 +57,13 @@ from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.qos import newest_qos, polled_qos, replace_reliability, result_qos, topic_qos
+from rover_planner.ros.qos import (
+    newest_qos,
+    polled_qos,
+    replace_reliability,
+    result_qos,
+    topic_qos,
+)
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
