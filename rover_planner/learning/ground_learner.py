@@ -206,7 +206,7 @@ class GroundLearner:
         if not math.isfinite(time):
             return False
         elapsed, self._time, new = time - last, time, False
-        if not elapsed <= LONGEST_GAP or self._jumps(row):
+        if not 0.0 <= elapsed <= LONGEST_GAP or self._jumps(row):
             self._begin()
             elapsed = 0.0
         else:
@@ -254,15 +254,16 @@ class GroundLearner:
         window = self._windows.take(float(row[TIME]), block["turned"] / count, state)
         if window is None:
             return False
-        elapsed = window.time - self.window.time if self.window else self._block_duration
-        self.window = window
+        last, self.window = self.window, window
+        follows = last is not None and window.time > last.time  # else the clock was set back
+        elapsed = window.time - last.time if follows else self._block_duration
         classes = self.ground.classes_at(window.places)
         for number in set(classes[np.isfinite(classes)].astype(int).tolist()):
             self._classes.setdefault(number, FrictionFilter(self._told))
         on_class = {number: classes == number for number in self._classes}
         self._learn(window, measured, on_class, min(elapsed, window.duration))
         moved = float(np.abs(window.places - self._marked).max())
-        if moved > 0.5 * self._rover.wheel.width or window.time > self._mark_time + MARK_TIME:
+        if moved > 0.5 * self._rover.wheel.width or abs(window.time - self._mark_time) > MARK_TIME:
             self._marked, self._mark_time = window.places, window.time
             for one, wheels in zip(self._sides.values(), _SIDE_WHEELS, strict=True):
                 self.ground.visit(window.places[wheels & np.isnan(classes)], one.estimate)
