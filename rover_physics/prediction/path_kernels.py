@@ -12,8 +12,8 @@ from rover_physics.results.record import join_results, new_results, select_resul
 from rover_physics.status import PoseStatus
 
 LONGEST_STEP = 1.0 + 1e-6
-"""Distance [wheel radii] of neighbours up to which it is looked at what lies between: a radius, and
-what rounding adds to poses that are a radius apart."""
+"""Distance [wheel radii] of neighbours up to which it is looked at what lies between: a radius,
+however the distance is rounded."""
 HEIGHT_JUMP = 0.25
 """Change of a wheel's height between two poses [wheel radii] above which it is a jump."""
 MIN_SPACING = 1e-4
