@@ -163,7 +163,7 @@ def test_a_height_that_no_ground_has_is_refused_by_file_and_value(tmp_path, valu
     heights = np.zeros((40, 50), np.float32)
     heights[3, 4] = value
     path = write_tif(tmp_path / "a.tif", heights, nodata=-9999)
-    with pytest.raises(PlanningError, match=r"a\.tif: holds (inf|-2e\+09); heights must be finite"):
+    with pytest.raises(PlanningError, match=r"a\.tif: holds (inf|-2e\+09); heights must"):
         GeoTiffMap(path).read((slice(0, 40), slice(0, 50)))
 
 
