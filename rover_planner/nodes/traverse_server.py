@@ -57,7 +57,13 @@ from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.qos import newest_qos, polled_qos, replace_reliability, topic_qos
+from rover_planner.ros.qos import (
+    newest_qos,
+    polled_qos,
+    replace_reliability,
+    result_qos,
+    topic_qos,
+)
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
@@ -135,7 +141,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
         hear(String, "~/ground_estimate", self._take_ground, qos)
-        self.create_subscription(String, "~/mark_place", self._take_mark, qos)
+        # Only a transient-local one hears of places that were marked before a restart.
+        for profile in (qos, result_qos()):
+            self.create_subscription(String, "~/mark_place", self._take_mark, profile)
 
     def _log_ready(self) -> None:
         name, known = self.service.settings.rover.name, self.service.known_map
@@ -193,8 +201,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         except RoverError as error:
             self.get_logger().warning(f"not used: {error}")
             return
-        self.service.mark(place)
-        self.get_logger().warning(place.describe())
+        if self.service.mark(place):
+            self.get_logger().warning(place.describe())
 
     def _clear_marks(
         self, _request: Trigger.Request, response: Trigger.Response
