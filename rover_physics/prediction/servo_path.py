@@ -22,7 +22,13 @@ import numpy as np
 from rover_physics.limits.table import MIN_SPEED_SHARE, RUNAWAY
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.path_kernels import FACE, Crossings, Wheels, distances_between
+from rover_physics.prediction.path_kernels import (
+    FACE,
+    LONGEST_STEP,
+    Crossings,
+    Wheels,
+    distances_between,
+)
 from rover_physics.results.record import select_results
 from rover_physics.status import PoseStatus, Stall
 
@@ -203,7 +209,7 @@ def _find_drift(course: _Course, window: float) -> Floats:
             turns, of its outermost wheel.
     """
     wheels, poses, crossings = course.wheels, course.waypoints, course.crossings
-    long_steps = np.append(False, distances_between(wheels, poses) > wheels.radius)
+    long_steps = np.append(False, distances_between(wheels, poses) > LONGEST_STEP * wheels.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
     course = _Course(wheels, poses, course.results, turns)
     share, deviation = course.values("speed_share"), course.values("deviation")
