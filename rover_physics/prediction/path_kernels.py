@@ -11,10 +11,13 @@ from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.results.record import join_results, new_results, select_results
 from rover_physics.status import PoseStatus
 
+LONGEST_STEP = 1.0 + 1e-6
+"""Distance [wheel radii] of neighbours up to which it is looked at what lies between: a radius,
+however the distance is rounded."""
 HEIGHT_JUMP = 0.25
 """Change of a wheel's height between two poses [wheel radii] above which it is a jump."""
-MIN_SPACING = 1e-4
-"""Distance between poses [m] below which a jump counts as at one place."""
+MIN_SPACING = 1e-3
+"""Distance between poses [wheel radii] below which a jump counts as at one place."""
 PEAK_SPACING, EDGE_SPACING = 0.01, 0.02
 """Distances [wheel radii] below which peaks of forces at a limit are not searched, and smaller
 peaks and ends of falls. With 0.06 for smaller peaks, twice as many waypoints change 5 verdicts in
@@ -148,7 +151,7 @@ def find_jumps(results, poses, joined, wheels, ends):
         if not joined[row]:
             continue
         distance = distance_between(poses[row], poses[row + 1], wheels.swing_radius)
-        if not 0.0 < distance <= wheels.radius:
+        if not 0.0 < distance <= LONGEST_STEP * wheels.radius:
             continue
         if wanted_spacing(results[row], results[row + 1], wheels) < distance:
             ends[count, 0], ends[count, 1] = row, row + 1
@@ -163,7 +166,7 @@ def wanted_spacing(here, there, wheels):
         return np.inf
     if not jumps_between(here, there, wheels):
         return _finest(here, there, wheels)
-    return MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING * wheels.radius
+    return (MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING) * wheels.radius
 
 
 @exact_kernel
@@ -379,7 +382,7 @@ def find_remaining_jumps(path, between, wheels, ends):
             if last < n and here < n:
                 apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
             searched = last >= n or here >= n or apart > 0.0
-            if searched and apart <= wheels.radius:
+            if searched and apart <= LONGEST_STEP * wheels.radius:
                 ends[count, 0], ends[count, 1] = last, here
                 count += 1
         last = here

@@ -82,7 +82,7 @@ class PathJudge:
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
     known: KnownPoses | None = None
-    """What the model has found along whole paths so far, None if that is not kept."""
+    """Results of the model along whole paths so far, None if that is not kept."""
     known_in_pieces: KnownPoses | None = None
     """The same along pieces, with the friction and torque limit for which they are judged."""
     poses: int = field(default=0, init=False)

@@ -91,7 +91,7 @@ class Scenario:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged(Candidate):
+class JudgedPath(Candidate):
     """A path as it was judged for a scenario, and why; what follows is computed once."""
 
     scenario: Scenario
@@ -143,13 +143,13 @@ class Shown:
 
     scenario: Scenario
     """Values for which the path that is looked at was judged."""
-    paths: tuple[Judged, ...]
-    """Candidates, then ways around obstacles; each as it was judged last."""
+    paths: tuple[JudgedPath, ...]
+    """Candidates, then paths around obstacles; each as it was judged last."""
     index: int
     """Index of the path that is looked at."""
     generated: int
     """Number of candidates; paths beyond were searched."""
-    reference: Judged | None = None
+    reference: JudgedPath | None = None
     """The same path with the values of the reference; None if nothing differs from it."""
     by_policy: Mapping[str, Verdict | str] = field(default_factory=dict)
     """Its verdicts under torque policies that are known, or why a policy has none."""
@@ -162,7 +162,7 @@ class Shown:
     """The finding of a search around obstacles for the scenario; None if none was made."""
 
     @property
-    def path(self) -> Judged:
+    def path(self) -> JudgedPath:
         """The path that is looked at."""
         return self.paths[self.index]
 
