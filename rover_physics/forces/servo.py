@@ -23,6 +23,7 @@ from rover_physics.forces.servo_wheel import D, S, T
 from rover_physics.forces.shares import write_shares
 from rover_physics.forces.soil import (
     BEKKER_WONG,
+    SOIL_FRICTION,
     SOIL_MODEL,
     SoilWheel,
     effective_friction,
@@ -67,6 +68,7 @@ def balance_servos(model, work):
         if settings.on_soil:
             soil = servo.soil[wheel]
             copy_soil(model.ground, soil_row_at(model.ground, x, y), soil)
+            soil[SOIL_FRICTION] *= settings.friction_factor[wheel]
             servo.yields[wheel] = 1 if soil[SOIL_MODEL] == BEKKER_WONG else 0
             if not servo.yields[wheel]:
                 own = SoilWheel(linkage.radius, linkage.width, mu)

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from rover_physics.forces.soil import SoilWheel, grip_on, solve_wheel
+from rover_physics.forces.soil import SOIL_FRICTION, SoilWheel, grip_on, solve_wheel
 from rover_physics.forces.torques import LOAD_KEPT, apply_torques, minimise_friction
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import TorquePolicy
@@ -31,6 +31,7 @@ def share_forces_on_soil(model, work):
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         copy_soil(ground, soil_row_at(ground, x, y), work.soils[wheel])
+        work.soils[wheel, SOIL_FRICTION] *= settings.friction_factor[wheel]
     apply_torques(work.balance, np.int64(0), search)
     if settings.policy == TorquePolicy.EQUAL:
         return
