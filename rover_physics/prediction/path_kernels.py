@@ -42,11 +42,6 @@ AT_LIMIT = 0.95
 """Share of a limit from which a peak is looked for at the smallest spacing."""
 
 
-Sums = tuple[float, float, float]
-"""Distance [m], time [s] and energy [J] since the start of a path."""
-NO_SUMS = (0.0, 0.0, 0.0)
-
-
 class Wheels(NamedTuple):
     """Size of a rover's wheels and of the rover, and the limits of their forces and speeds."""
 
@@ -288,17 +283,6 @@ def _largest_use(result, wheels):
         torque = result.torque_saturation[wheel] / most_torque
         use = max(use, friction, torque)
     return use
-
-
-def sum_up(
-    wheels: Wheels, poses: np.ndarray, results: Any, start: Sums = NO_SUMS
-) -> tuple[Floats, Sums]:
-    """Return distance [m], time [s] and energy [J] at all poses (3, n), and at the last one.
-
-    Arguments are those of `add_up`; where the last pose is not settled, only its own are known.
-    """
-    sums = np.empty((3, len(poses)))
-    return sums, add_up(view_read_only(poses), view_read_only(results), wheels, start, sums)
 
 
 @exact_kernel
