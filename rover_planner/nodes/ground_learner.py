@@ -37,7 +37,14 @@ from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import latched_qos, newest_qos, polled_qos, result_qos, sensor_qos
+from rover_planner.ros.qos import (
+    joints_qos,
+    latched_qos,
+    newest_qos,
+    polled_qos,
+    result_qos,
+    sensor_qos,
+)
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.shell.kernels import load_kernels
@@ -84,7 +91,8 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         hear, rows = self.heard.subscribe, self._rows
         hear(TwistStamped, "cmd_vel", self._take_command, newest_qos())
-        hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), polled_qos())
+        joints = joints_qos(POLLING)
+        hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), joints)
         hear(Imu, "imu", self._take_imu, polled_qos())
         hear(Odometry, "odometry", self._take_odometry, polled_qos())
         self.loop = self.create_timer(POLLING, self._read_sensors)

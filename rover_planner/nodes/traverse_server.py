@@ -58,8 +58,8 @@ from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import (
+    joints_qos,
     newest_qos,
-    polled_qos,
     replace_reliability,
     result_qos,
     topic_qos,
@@ -133,7 +133,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _create_subscriptions(self) -> None:
         hear, inputs = self.heard.subscribe, self._inputs
-        hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), polled_qos())
+        joints = joints_qos(IDLE_PERIOD)
+        hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), joints)
         hear(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
             hear(Imu, "imu", lambda one, _: inputs.take_imu(one), newest_qos())
