@@ -131,7 +131,8 @@ def _sort_half(stretches, poses, results, before, after):
     """Close a half, ask for its middle, or leave it as it is."""
     wheels, numbers = stretches.wheels, stretches.numbers
     distance = distance_between(poses[before], poses[after], wheels.swing_radius)
-    if distance < MIN_SPACING and jumps_between(results[before], results[after], wheels):
+    is_place = distance < MIN_SPACING * wheels.radius
+    if is_place and jumps_between(results[before], results[after], wheels):
         _close(stretches, before, after)
     elif wanted_spacing(results[before], results[after], wheels) < distance:
         row = numbers[Progress.ROWS]

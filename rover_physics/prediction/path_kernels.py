@@ -16,8 +16,8 @@ LONGEST_STEP = 1.0 + 1e-6
 however the distance is rounded."""
 HEIGHT_JUMP = 0.25
 """Change of a wheel's height between two poses [wheel radii] above which it is a jump."""
-MIN_SPACING = 1e-4
-"""Distance between poses [m] below which a jump counts as at one place."""
+MIN_SPACING = 1e-3
+"""Distance between poses [wheel radii] below which a jump counts as at one place."""
 PEAK_SPACING, EDGE_SPACING = 0.01, 0.02
 """Distances [wheel radii] below which peaks of forces at a limit are not searched, and smaller
 peaks and ends of falls. With 0.06 for smaller peaks, twice as many waypoints change 5 verdicts in
@@ -166,7 +166,7 @@ def wanted_spacing(here, there, wheels):
         return np.inf
     if not jumps_between(here, there, wheels):
         return _finest(here, there, wheels)
-    return MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING * wheels.radius
+    return (MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING) * wheels.radius
 
 
 @exact_kernel

@@ -120,7 +120,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
     nominal = speed**2 / (2.0 * gravity)
     distances = np.append(0.0, course.distances)
     stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
-    head, carried = 0.0, np.zeros(len(deficits))
+    head, carried, most = 0.0, np.zeros(len(deficits)), RUNAWAY * course.wheels.radius
     for k in np.flatnonzero(deficits).tolist():
         if k > 0 and deficits[k - 1] == 0.0:
             head = 0.0 if stands[k - 1] else share[k - 1] ** 2 * nominal[k - 1]
@@ -129,7 +129,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
         before = deficits[k - 1] if (deficits[k - 1] < 0.0) == (deficits[k] < 0.0) else 0.0
         head -= 0.5 * (before + deficits[k]) * distances[k] if distances[k] else 0.0
         head = 0.0 if stands[k] and deficits[k] > 0.0 else max(head, 0.0)
-        if MIN_SPEED_SHARE**2 * nominal[k] < head <= RUNAWAY:
+        if MIN_SPEED_SHARE**2 * nominal[k] < head <= most:
             carried[k] = head
     rolls = carried > 0.0
     share[rolls] = np.sqrt(carried[rolls] / nominal[rolls])
