@@ -153,7 +153,7 @@ class PathJudge:
         Goals on the start's side of a ring come first. If these cannot be reached, those behind
         them rarely can, and each goal costs the evaluation of all candidates.
         """
-        for ring in rings_within(start, goal, tolerance):
+        for ring in rings_within(start, goal, tolerance, self.rover.wheel.radius):
             judged = ((pose, self._judge_path(pose[None, :])) for pose in ring)
             standing = (pose for pose, one in judged if one.verdict.traversable)
             yield from itertools.islice(standing, _QUERIES_PER_RING)

@@ -25,8 +25,10 @@ from rover_planner.viewer.state.path_limits import (
 )
 
 Pose = tuple[float, float, float]
-CANDIDATES = PathQueryOptions(count=5, spacing=0.5)
+CANDIDATES = PathQueryOptions(count=5)
 """Options of the candidates that the page begins with."""
+SPACING = 5.0
+"""Distance between candidates half-way where none is told [wheel radii]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,10 @@ class Scenario:
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
     search: LatticeSettings = field(default_factory=LatticeSettings)
     """Options of the search of a path around obstacles."""
+
+    def __post_init__(self) -> None:
+        spacing = self.options.spacing or SPACING * self.loaded.wheel.radius
+        object.__setattr__(self, "options", self.options.change(spacing=spacing))
 
     @property
     def arm(self) -> dict[str, float]:
