@@ -184,11 +184,9 @@ def _choose_torques(model, work):
     if not _evaluate(model, work):
         return False
     if box.columns > 1:
-        weight = linkage.mass * linkage.gravity
         for wheel in range(6):
             rover.search.mu[wheel] = box.mu_low[wheel]
-        largest = model.settings.allowed_torque / (linkage.radius * weight)
-        minimise_friction(rover.balance, largest, rover.search)
+        minimise_friction(linkage, model.settings, rover.balance, rover.search)
         return _evaluate(model, work)
     return True
 

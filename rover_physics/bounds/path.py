@@ -312,8 +312,8 @@ def _let_torques_follow(settings, search, result):
         most_torque = max(most_torque, most_use * allowed)
     for k in range(FREE_TORQUES, FREE_FORCES):
         if search.y[k] != 0.0:
-            # Lateral forces differ from equal shares only if equal shares would slip.
-            most_use = max(most_use, 1.0)
+            # Lateral forces differ from equal shares only if these need more than is allowed.
+            most_use = max(most_use, settings.allowed_friction)
     for wheel in range(6):
         result.friction_utilisation[wheel, 0] = result.torque_saturation[wheel, 0] = 0.0
         result.friction_utilisation[wheel, 1] = most_use

@@ -28,7 +28,6 @@ def share_forces_on_soil(model, work):
     """
     ground, linkage, settings = model.ground, model.linkage, model.settings
     search, best = work.search, work.best
-    weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         copy_soil(ground, soil_row_at(ground, x, y), work.soils[wheel])
@@ -40,9 +39,7 @@ def share_forces_on_soil(model, work):
     _copy(search, best)
     for _ in range(ROUNDS):
         _write_grip(linkage, work)
-        minimise_friction(
-            work.balance, settings.allowed_torque / (linkage.radius * weight), search
-        )
+        minimise_friction(linkage, settings, work.balance, search)
         needed = _needed(linkage, settings, work)
         if needed <= least:
             least = needed

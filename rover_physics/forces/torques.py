@@ -87,21 +87,24 @@ def apply_torques(balance, free, search):
 
 
 @kernel
-def minimise_friction(balance, max_traction, search):
+def minimise_friction(linkage, settings, balance, search):
     """Find the torques that need the least friction and write their forces into `search`.
 
     The search starts from equal torques. Lateral forces keep their equal shares if these are
-    feasible. Otherwise they are free, and wheels with friction in reserve take over. If no torques
-    within their limit keep all wheels on the ground, the forces are those closest to that.
+    within the allowed friction. Otherwise they are free, and wheels with friction in reserve take
+    over. If no torques within their limit keep all wheels on the ground, the forces are those
+    closest to that.
 
     Args:
+        linkage: LINKAGE.
+        settings: SETTINGS.
         balance: BALANCE with all columns.
-        max_traction: Largest torque over wheel radius and rover weight.
         search: TORQUE_SEARCH; reads `mu` and `resistance`.
     """
-    most = min(max_traction, MOST_TRACTION)
+    weight = linkage.mass * linkage.gravity
+    most = min(settings.allowed_torque / (linkage.radius * weight), MOST_TRACTION)
     found = _search(balance, np.int64(FREE_TORQUES), most, search)
-    if not found or _needed(search, SearchGoal.FRICTION) > 1.0:
+    if not found or _needed(search, SearchGoal.FRICTION) > settings.allowed_friction:
         _search(balance, np.int64(FREE_FORCES), most, search)
 
 

@@ -72,7 +72,7 @@ class Stretches(NamedTuple):
 NO_STRETCHES = Stretches(
     np.empty((0, 2), np.int64), np.empty(0), np.empty(0, np.int64), np.empty((0, 2), np.int64),
     np.zeros(3, np.int64), np.empty(0, np.int64), np.empty(0, np.int64),
-    Wheels(0.0, 0.0, 0.0, 0.0, 0.0, False), int(AtFailure.SEARCH_ON),
+    Wheels(0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0), int(AtFailure.SEARCH_ON),
 )  # fmt: skip
 """Value of `stretches` where poses are given."""
 

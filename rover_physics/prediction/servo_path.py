@@ -28,8 +28,9 @@ from rover_physics.prediction.path_kernels import (
     Crossings,
     Wheels,
     distances_between,
+    sum_up,
 )
-from rover_physics.results.record import select_results
+from rover_physics.results.record import join_results, select_results
 from rover_physics.status import PoseStatus, Stall
 
 WEDGED = np.radians(140.0)
@@ -156,8 +157,8 @@ def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
     return heights[:n], heights[n:]
 
 
-def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats:
-    """Return time [s] and energy [J] (n, 2) by which climbs exceed what `add_up` counts.
+def climb_costs(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Crossings) -> Floats:
+    """Return time [s] and energy [J] (n, 2) that `add_up` does not count for climbs.
 
     A wheel that climbs takes its time while the body hardly moves. The distance that the rover
     goes is the mean of those of its wheel centres; a wheel that goes down more steeply than 45
@@ -165,6 +166,7 @@ def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats
     between settled waypoints that have poses between them.
 
     Args:
+        wheels: Wheels.
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
         results: (n,) RESULT of each waypoint.
         crossings: Poses between the waypoints.
@@ -179,23 +181,23 @@ def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats
             continue
         rows = (crossings.waypoint == i) & between & settled
         inside = select_results(crossings.results, rows)
-        share, power, centres = (
-            np.concatenate([results[name][i - 1 : i], inside[name], results[name][i : i + 1]])
-            for name in ("speed_share", "power", "wheel_centres")
-        )
-        share = np.where(share > 0.0, share, 1.0)
-        moved = np.diff(centres, axis=0)
+        here, there = slice(i - 1, i), slice(i, i + 1)
+        places = np.concatenate([poses[here], crossings.poses[rows], poses[there]])
+        stretch = join_results([results[here], inside, results[there]])
+        share = np.where(stretch["speed_share"] > 0.0, stretch["speed_share"], 1.0)
+        moved = np.diff(stretch["wheel_centres"], axis=0)
         level = np.hypot(moved[..., 0], moved[..., 1])
         distances = np.where(moved[..., 2] < -level, level, np.linalg.norm(moved, axis=2))
         durations = distances.mean(axis=1) / (0.5 * speed * (share[1:] + share[:-1]))
         if not durations.sum() > 0.0:
             continue
-        energy = 0.5 * (power[1:] + power[:-1]) * durations
         rise = results["q"][i, 0] - results["q"][i - 1, 0]
         level_distance = np.hypot(*(poses[i, :2] - poses[i - 1, :2]))
         counted = np.hypot(level_distance, rise) / (0.5 * speed * (share[0] + share[-1]))
         extra[i, 0] = max(durations.sum() - counted, 0.0)
-        extra[i, 1] = max(energy.sum() - 0.5 * (power[0] + power[-1]) * counted, 0.0)
+        alone = slice(i - 1, i + 1)
+        extra[i, 1] = sum_up(wheels, places, stretch)[1][2]
+        extra[i, 1] -= sum_up(wheels, poses[alone], results[alone])[1][2]
     return np.asarray(np.cumsum(extra, axis=0))
 
 

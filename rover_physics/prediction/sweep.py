@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.errors import PoseError
-from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
@@ -27,12 +26,14 @@ from rover_physics.prediction.failures import find_suspects
 from rover_physics.prediction.halving import AtFailure
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
+    NO_SUMS,
     Crossings,
-    add_up,
+    Sums,
     distances_between,
     find_remaining_jumps,
     join_crossings,
     none_held,
+    sum_up,
 )
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.servo_path import (
@@ -58,10 +59,6 @@ BLOCK_TIME = 3e-3
 found does not depend on the blocks."""
 PART = 8192
 """Number of waypoints that are swept at a time in parts."""
-
-Sums = tuple[float, float, float]
-"""Distance [m], time [s] and energy [J] since the start of a path."""
-NO_SUMS = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +199,7 @@ def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> 
 
     Returns:
         The prediction, as a sweep over the reversed poses gives it, apart from rounding. `power`
-        and `energy` are those of the way in.
+        is that of the way in.
     """
     first, end = waypoints.start, waypoints.stop
     n, wheels = end - first, model.wheels
@@ -374,7 +371,7 @@ def make_prediction(
     _write_sums(model, crossings.poses, between, NO_SUMS)
     _write_sums(model, poses, results, start)
     if wheels.on_servos:
-        time, energy = climb_costs(poses, results, crossings).T
+        time, energy = climb_costs(wheels, poses, results, crossings).T
         results["time"] += time
         results["energy"] += energy
     at_crossings = _collect(model, crossings.poses, between, crossings.waypoint)
@@ -410,16 +407,14 @@ def _sum_up(
     """Return distance [m], time [s] and energy [J] at the last pose from those at the first."""
     if model.wheels.on_servos:
         before = crossings.select(crossings.waypoint < len(poses))
-        time, energy = climb_costs(poses, results, before)[-1]
+        time, energy = climb_costs(model.wheels, poses, results, before)[-1]
         start = (start[0], start[1] + time, start[2] + energy)
-    path, sums = (view_read_only(poses), view_read_only(results)), np.empty((3, len(poses)))
-    return add_up(*path, model.record.linkage.steering_rate, start, sums)
+    return sum_up(model.wheels, poses, results, start)[1]
 
 
 def _write_sums(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> None:
     """Write distance, time and energy at poses (n, 3) into their RESULTs."""
-    sums, rate = np.empty((3, len(poses))), model.record.linkage.steering_rate
-    add_up(view_read_only(poses), view_read_only(results), rate, start, sums)
+    sums = sum_up(model.wheels, poses, results, start)[0]
     results["distance"], results["time"], results["energy"] = sums
 
 

@@ -53,6 +53,23 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
     assert compared >= 2
 
 
+@pytest.mark.parametrize(("limit", "margin"), [(1.0, 0.2), (0.8, 0.0)])
+def test_more_friction_refuses_no_pose(limit, margin):
+    """Lateral forces need not be free where there is more of it."""
+    rocks = rocky(11, half=1.2)
+    banked = rocks.elevation + 0.4 * np.linspace(0.0, 2.4, len(rocks.elevation))[:, None]
+    ground, poses = replace(rocks, elevation=banked), random_poses(11, 40, 0.6)
+    rover = replace(LSR1, limits=replace(LSR1.limits, friction_utilisation=limit))
+    passed = set()
+    for friction in np.arange(0.4, 0.7, 0.02):
+        options = SweepOptions("optimal", margin, friction=friction)
+        codes = judge_poses(rover, ground, poses, options=options)[1].codes
+        passes = {i for i, code in enumerate(codes) if not code}
+        assert passed <= passes
+        passed = passes
+    assert passed
+
+
 @pytest.mark.parametrize(
     ("soil", "slope"), [("dry_sand", 0.2), ("dry_sand", -0.4), ("lunar_nominal", -0.4)]
 )
