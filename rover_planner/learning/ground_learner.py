@@ -255,8 +255,9 @@ class GroundLearner:
         if window is None:
             return False
         last, self.window = self.window, window
-        follows = last is not None and window.time > last.time  # else the clock was set back
-        elapsed = window.time - last.time if follows else self._block_duration
+        elapsed = self._block_duration
+        if last is not None and window.time > last.time:  # else the clock was set back
+            elapsed = window.time - last.time
         classes = self.ground.classes_at(window.places)
         for number in set(classes[np.isfinite(classes)].astype(int).tolist()):
             self._classes.setdefault(number, FrictionFilter(self._told))
