@@ -93,7 +93,10 @@ def _find_drops(wheels, poses, results, between):
             lowest = min(lowest, angle[k, wheel])
         if lowest < -MIN_ANGLE:
             result = results[i] if i < n else between.results[i - n]
-            _find_rolling_off_edge(result, wheels, rolling_off_edge[k])
+            some, on_edges = may_roll_off_edge(result, wheels)
+            for wheel in range(6):
+                rolls = some and _rolls_off_edge(result, wheels, wheel, on_edges)
+                rolling_off_edge[k, wheel] = rolls
     first_open = _clear_open_runs(rolling_off_edge)
     _clear_slides(height, angle, wheels.drop_limit, rolling_off_edge)
     descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
@@ -141,14 +144,6 @@ def _merge(n, place, order):
             i += 1
         else:
             order[k] = waypoint
-
-
-@exact_kernel
-def _find_rolling_off_edge(result, wheels, rolling_off_edge):
-    """Write (6,) True for wheels that may roll off an edge."""
-    some, on_edges = may_roll_off_edge(result, wheels)
-    for wheel in range(6):
-        rolling_off_edge[wheel] = some and _rolls_off_edge(result, wheels, wheel, on_edges)
 
 
 @exact_kernel

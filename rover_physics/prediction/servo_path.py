@@ -46,13 +46,8 @@ def write_servo_path(
     course = _Course(model.wheels, poses, results, crossings)
     _carry_by_momentum(course, float(model.record.linkage.gravity))
     _stop_in_slots(course)
-    results["drift"] = _find_drift(course, drift_window(model))
+    results["drift"] = _find_drift(course, model.rover.wheelbase)
     results["lift_height"], crossings.results["lift_height"] = _find_lift_heights(course)
-
-
-def drift_window(model: PackedModel) -> float:
-    """Return the way before a waypoint within which drift counts [m]: the rover's length."""
-    return float(model.record.linkage.length)
 
 
 class _Course:

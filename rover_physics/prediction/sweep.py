@@ -35,11 +35,7 @@ from rover_physics.prediction.path_kernels import (
     none_held,
 )
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.servo_path import (
-    climb_costs,
-    drift_window,
-    write_servo_path,
-)
+from rover_physics.prediction.servo_path import climb_costs, write_servo_path
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import (
     join_results,
@@ -161,7 +157,7 @@ def _find_restart(model: PackedModel, poses: np.ndarray, drops: Drops) -> int:
     if model.wheels.on_servos:
         way = np.append(0.0, np.cumsum(distances_between(model.wheels, poses)))
         last = way[min(drops.decided, len(way) - 1)]
-        starts = starts[way[starts] <= last - drift_window(model)]
+        starts = starts[way[starts] <= last - model.rover.wheelbase]
     return int(starts[-1]) if len(starts) else 0
 
 
