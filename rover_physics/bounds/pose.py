@@ -16,7 +16,6 @@ import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.settling import (
-    GroundSlope,
     find_step,
     limit_step,
     write_gap_rates,
@@ -120,10 +119,10 @@ def _find_heights(uncertain, work):
         if in_doubt and abs(gap) > EXTREME_GAP * linkage.radius:
             spread.low[wheel] -= abs(gap)
             spread.high[wheel] += abs(gap)
-    write_gap_rates(linkage, placement, contacts, GroundSlope.LEVEL, spread.rates)
+    write_gap_rates(linkage, placement, contacts, spread.rates, sloped=False)
     if not _invert(spread.rates, rover.J, spread.lift):
         return BoundStatus.ON_EDGE
-    write_gap_rates(linkage, placement, contacts, GroundSlope.SLOPED, spread.rates)
+    write_gap_rates(linkage, placement, contacts, spread.rates, sloped=True)
     if not _invert(spread.rates, rover.J, spread.response):
         return BoundStatus.ON_EDGE
     return BoundStatus.BOUNDED
@@ -286,7 +285,7 @@ def _approach(uncertain, work):
             return outcome, worst
         if attempt == EXTREME_STEPS - 1:
             break
-        if not find_step(linkage, rover, GroundSlope.SLOPED):
+        if not find_step(linkage, rover, sloped=True):
             return BoundStatus.ON_EDGE, worst
         share = limit_step(rover.step, MAX_TURN)
         if attempt > 3:

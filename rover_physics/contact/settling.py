@@ -13,8 +13,6 @@ bracketing finds it whatever the shape of the ground. The wheels are closed in t
 lift shifts the other wheels sideways.
 """
 
-from enum import IntEnum
-
 import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
@@ -55,15 +53,6 @@ MAX_TURN = 0.3
 """Largest change of an angle in one trial [rad]."""
 
 
-class GroundSlope(IntEnum):
-    """Slope of the ground that the derivatives of the gaps assume."""
-
-    LEVEL = 0
-    """Level ground under each wheel."""
-    SLOPED = 1
-    """The slope at the contact."""
-
-
 @kernel
 def settle(model, work):
     """Settle the rover at `work.pose`: write `work.q`, its placement and its contacts.
@@ -87,7 +76,7 @@ def settle(model, work):
     if np.isnan(worst):
         return _refuse(status)
     _lower_to_ground(work)
-    if find_step(model.linkage, work, GroundSlope.LEVEL):
+    if find_step(model.linkage, work, sloped=False):
         share = limit_step(work.step, MAX_STEP)
         for i in range(6):
             work.q[i] -= share * work.step[i, 0]
@@ -164,7 +153,7 @@ def _close_gaps(model, work, worst, together):
             together; else each starts where the one before has ended.
     """
     start, q = work.start, work.q
-    write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.LEVEL, work.J)
+    write_gap_rates(model.linkage, work.placement, work.contacts, work.J, sloped=False)
     work.lifts[:, :] = 0.0
     for wheel in range(6):
         work.lifts[wheel, wheel] = 1.0
@@ -283,7 +272,7 @@ def _newton(model, work):
     for _ in range(MAX_NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE or np.isnan(worst):
             return
-        if not find_step(model.linkage, work, GroundSlope.SLOPED):
+        if not find_step(model.linkage, work, sloped=True):
             return
         fraction = limit_step(step, MAX_STEP)
         improved = np.inf
@@ -329,24 +318,24 @@ def limit_step(step, most):
 
 
 @kernel
-def find_step(linkage, work, ground_is):
-    """Solve J step = gaps; `ground_is` is a GroundSlope. Return False if J is singular."""
-    write_gap_rates(linkage, work.placement, work.contacts, ground_is, work.J)
+def find_step(linkage, work, sloped):
+    """Solve J step = gaps; `sloped` is as for `write_gap_rates`. Return False if J is singular."""
+    write_gap_rates(linkage, work.placement, work.contacts, work.J, sloped)
     for i in range(6):
         work.step[i, 0] = work.contacts.gap[i]
     return solve_in_place(work.J, work.step, 6, 1)
 
 
 @kernel
-def write_gap_rates(linkage, placement, contacts, ground_is, J):
+def write_gap_rates(linkage, placement, contacts, J, sloped):
     """Write the derivatives of the gaps by q into J (6, 6) [m/m or m/rad].
 
     Args:
         linkage: LINKAGE.
         placement: PLACEMENT at q.
         contacts: CONTACTS with points and normals.
-        ground_is: A GroundSlope.
         J: (6, 6), row per wheel, column per element of q; written.
+        sloped: Whether the ground has the slope at the contact, else it is level.
     """
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
@@ -358,7 +347,7 @@ def write_gap_rates(linkage, placement, contacts, ground_is, J):
     slope = 0.0, 0.0
     for i in range(6):
         side = i // 3
-        if ground_is == GroundSlope.SLOPED:
+        if sloped:
             slope = normal[i, 0], normal[i, 1]
         arm = difference(point[i], origin)
         J[i, 0] = 1.0

@@ -56,9 +56,7 @@ class _Course:
     def __init__(self, wheels: Wheels, poses: Floats, results: Any, crossings: Crossings):
         self.wheels, self.crossings = wheels, crossings
         self.waypoints, self.results = poses, results
-        places = np.append(np.arange(len(poses)), crossings.place)
-        self.order = np.lexsort((np.arange(len(places)) >= len(poses), places))
-        """Rows of this order: of the waypoints, numbered from 0, and then of the others."""
+        self.order = crossings.order_among(len(poses))
         self.poses = np.concatenate([poses, crossings.poses])[self.order]
 
     @cached_property

@@ -201,18 +201,18 @@ def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> 
         and `energy` are those of the way in.
     """
     first, end = waypoints.start, waypoints.stop
-    n, wheels = end - first, model.wheels
+    n = end - first
     poses = np.ascontiguousarray(swept.prediction.poses[first:end][::-1])
     results = _reverse(select_results(swept.prediction.results, np.arange(first, end)[::-1]))
     crossings = swept.crossings.select(~swept.crossings.climbing).between(first, end - 1)
     crossings = crossings.reversed(n)
     _reverse(crossings.results)
     path = Crossings(np.arange(float(n)), np.arange(n) + 1, none_held(n), poses, results)
-    pairs = np.empty((n + len(crossings.place), 2), np.int64)
-    count = find_remaining_jumps(path.views, crossings.views, wheels, pairs)
+    path, order = join_crossings([path, crossings]), crossings.order_among(n)
+    pairs = np.empty((len(order), 2), np.int64)
+    count = find_remaining_jumps(path.views, order, n, model.wheels, pairs)
     if count:
-        ends = join_crossings([path, crossings]).select(pairs[:count].ravel())
-        climbs = climb_faces(model, ends, np.arange(2 * count).reshape(-1, 2))
+        climbs = climb_faces(model, path, pairs[:count])
         crossings = join_crossings([crossings, climbs]).in_order()
     return make_prediction(model, poses, results, crossings)[0].prediction
 
