@@ -25,7 +25,7 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.numerics.records import record_type
 from rover_physics.rover.linkage import place, rocker_sign
-from rover_physics.status import BoundStatus, ContactStatus
+from rover_physics.status import BoundStatus, PoseStatus
 
 NOMINAL_GAP = 1e-2
 """Largest gap [wheel radii] of a wheel in the predicted configuration. Next to rocks the search
@@ -241,8 +241,8 @@ def _find_contact_on(model, rover, wheel):
     """Find the contact of a wheel on one surface; return a BoundStatus."""
     contacts = rover.contacts
     outcome = find_contact(model, rover, wheel, SearchScope.QUICK)
-    if outcome != ContactStatus.IN_CONTACT or contacts.gap[wheel] != contacts.gap[wheel]:
-        off_map = outcome == ContactStatus.OFF_MAP
+    if outcome != PoseStatus.SETTLED or contacts.gap[wheel] != contacts.gap[wheel]:
+        off_map = outcome == PoseStatus.OFF_MAP
         return BoundStatus.OFF_MAP_NEAR if off_map else BoundStatus.UNKNOWN_NEAR
     find_contact(model, rover, wheel, SearchScope.FULL)
     return BoundStatus.BOUNDED

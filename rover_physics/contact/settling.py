@@ -20,7 +20,7 @@ from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import difference, solve_in_place
 from rover_physics.rover.linkage import place, rocker_sign
-from rover_physics.status import ContactStatus, PoseStatus
+from rover_physics.status import PoseStatus
 
 GAP_TOLERANCE = 3e-5
 """Largest gap in a settled pose [m], checked by a final search."""
@@ -74,7 +74,7 @@ def settle(model, work):
     place(model.linkage, work.pose, work.q, work.placement)
     status, worst = _find_contacts(model, work, SearchScope.COARSE)
     if np.isnan(worst):
-        return _refuse(status)
+        return status
     _lower_to_ground(work)
     if find_step(model.linkage, work, sloped=False):
         share = limit_step(work.step, MAX_STEP)
@@ -82,8 +82,8 @@ def settle(model, work):
             work.q[i] -= share * work.step[i, 0]
     place(model.linkage, work.pose, work.q, work.placement)
     status, worst = _find_contacts(model, work, SearchScope.QUICK)
-    if status != ContactStatus.IN_CONTACT:
-        return _refuse(status)
+    if status != PoseStatus.SETTLED:
+        return status
     worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
         before = worst
@@ -91,7 +91,7 @@ def settle(model, work):
         status, worst = _find_contacts(model, work, SearchScope.FULL)
         if worst <= GAP_TOLERANCE or np.isnan(worst) or worst > PROMISING * before:
             break
-    if status == ContactStatus.IN_CONTACT and worst > GAP_TOLERANCE:
+    if status == PoseStatus.SETTLED and worst > GAP_TOLERANCE:
         for i in range(6):
             work.unsettled[i] = work.q[i]
         for attempt in range(RECOVERY_ATTEMPTS):
@@ -102,10 +102,10 @@ def settle(model, work):
                 place(model.linkage, work.pose, work.q, work.placement)
             status, worst = _recover(model, work, attempt != 2)
             stands = worst <= GAP_TOLERANCE and not _has_turned_over(work.q)
-            if status == ContactStatus.IN_CONTACT and stands:
+            if status == PoseStatus.SETTLED and stands:
                 break
-    if status != ContactStatus.IN_CONTACT:
-        return _refuse(status)
+    if status != PoseStatus.SETTLED:
+        return status
     if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
         return PoseStatus.NOT_SETTLED
     for wheel in range(6):
@@ -123,14 +123,14 @@ def _recover(model, work, together):
         together: As for `_close_gaps`.
 
     Returns:
-        The worst ContactStatus, and the largest absolute gap [m]; infinite if the rover turns
+        The worst PoseStatus, and the largest absolute gap [m]; infinite if the rover turns
         over.
     """
     status, worst = _find_contacts(model, work, SearchScope.WHOLE)
     for _ in range(RECOVERIES):
         _close_gaps(model, work, worst, together)
         if _has_turned_over(work.q):
-            return ContactStatus.IN_CONTACT, np.inf
+            return PoseStatus.SETTLED, np.inf
         status, worst = _find_contacts(model, work, SearchScope.WHOLE)
         for _ in range(FINAL_ATTEMPTS):
             if worst <= GAP_TOLERANCE or np.isnan(worst):
@@ -238,21 +238,13 @@ def _lift_to(model, work, wheel, lift):
 
 
 @kernel
-def _refuse(status):
-    """Return the PoseStatus of a pose with a wheel off the map or over unknown ground."""
-    if status == ContactStatus.OFF_MAP:
-        return PoseStatus.OFF_MAP
-    return PoseStatus.UNKNOWN_GROUND
-
-
-@kernel
 def _find_contacts(model, work, scope):
-    """Write all contacts; return the worst ContactStatus and the largest absolute gap [m]."""
+    """Write all contacts; return the worst PoseStatus and the largest absolute gap [m]."""
     worst = 0.0
-    status = ContactStatus.IN_CONTACT
+    status = PoseStatus.SETTLED
     for wheel in range(6):
         of_wheel = find_contact(model, work, wheel, scope)
-        if of_wheel == ContactStatus.OFF_MAP or status == ContactStatus.IN_CONTACT:
+        if of_wheel == PoseStatus.OFF_MAP or status == PoseStatus.SETTLED:
             status = of_wheel
         gap = abs(work.contacts.gap[wheel])
         if gap > worst or gap != gap:
