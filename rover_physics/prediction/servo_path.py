@@ -47,7 +47,7 @@ def write_servo_path(
     _carry_by_momentum(course, float(model.record.linkage.gravity))
     _stop_in_slots(course)
     results["drift"] = _find_drift(course, model.rover.wheelbase)
-    results["lift_height"], crossings.results["lift_height"] = _find_lift_heights(course)
+    _write_lift_heights(course)
 
 
 class _Course:
@@ -126,12 +126,12 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
         course.write(name, np.where(rolls, np.minimum(values, 1.0), values))
 
 
-def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
-    """Return the heights (n, 6), (m, 6) [m] to which wheels have lifted, at waypoints and between.
+def _write_lift_heights(course: _Course) -> None:
+    """Write the heights [m] to which wheels have lifted, at waypoints and between.
 
     Poses at one place, as while a wheel climbs a face, add nothing.
     """
-    rate, n = course.values("lift_rate"), len(course.waypoints)
+    rate = course.values("lift_rate")
     heights = np.zeros(rate.shape)
     if (rate > 0.0).any():
         share = course.values("speed_share")
@@ -139,8 +139,7 @@ def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
         for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * course.distances[k - 1]
             heights[k] = np.where(rate[k] > 0.0, heights[k - 1] + rise, 0.0)
-    heights[course.order] = heights.copy()
-    return heights[:n], heights[n:]
+    course.write("lift_height", heights)
 
 
 def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats:

@@ -64,8 +64,6 @@ NO_SUMS = (0.0, 0.0, 0.0)
 class SweptPath:
     """A prediction along a path with the poses between its waypoints."""
 
-    path: np.ndarray
-    """(k, 3) all poses that were swept; the rest is about the first n of them."""
     prediction: PathPrediction
     """The prediction."""
     crossings: Crossings
@@ -74,20 +72,19 @@ class SweptPath:
     def cut(self, waypoints: int) -> "SweptPath":
         """Return what is about the first waypoints."""
         crossings = self.crossings.select(self.crossings.waypoint < waypoints)
-        return SweptPath(self.path, self.prediction.cut(waypoints), crossings)
+        return SweptPath(self.prediction.cut(waypoints), crossings)
 
 
 @dataclass(frozen=True, eq=False)
 class PathPart:
     """The prediction of consecutive waypoints of a path, as that of the whole path has them."""
 
-    first: int
-    """Index of the first waypoint that no earlier part has."""
+    start: int
+    """Index of its first waypoint; those of the prediction count from there."""
     context: int
-    """Number of waypoints at the beginning of the prediction that earlier parts have."""
+    """Number of waypoints at its beginning that earlier parts have."""
     prediction: PathPrediction
-    """The waypoints from `first - context` on, with `between`. Its indices of waypoints count from
-    there."""
+    """The prediction, with `between`."""
 
 
 def predict_paths(
@@ -139,7 +136,7 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
         swept, drops = make_prediction(model, here, results, crossings, sums)
         decided = end - start if end == len(path) else drops.decided
         if start + decided > done:
-            yield PathPart(done, done - start, swept.prediction.cut(decided))
+            yield PathPart(start, done - start, swept.prediction.cut(decided))
             done = start + decided
         restart = _find_restart(model, here, drops)
         if restart:
@@ -375,7 +372,7 @@ def make_prediction(
         results["energy"] += energy
     at_crossings = _collect(model, crossings.poses, between, crossings.waypoint)
     prediction = _collect(model, poses, results, np.arange(len(poses)), at_crossings)
-    return SweptPath(poses, prediction, crossings), drops
+    return SweptPath(prediction, crossings), drops
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:

@@ -182,8 +182,9 @@ def solve_traction(
     peak, min_load, max_torque = _measure_wheels(
         shares, rows.force_unit, friction, inputs.max_torque, inputs.radius, x, table
     )
+    torques, loads, tractions, lateral, utilisation = table
     return TractionAnswer(
-        *table,
+        torques, loads, tractions, lateral, utilisation,
         friction_slack=max(peak - 1.0, 0.0),
         load_slack=max(-min_load, 0.0),
         torque_slack=max(max_torque - inputs.max_torque, 0.0),
@@ -191,7 +192,7 @@ def solve_traction(
         programs=programs,
         fallback=programs == 0 < max_programs,
         status=status,
-    )
+    )  # fmt: skip
 
 
 @kernel
