@@ -22,10 +22,10 @@ from rover_physics.numerics.linear_algebra import difference, solve_in_place
 from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.status import PoseStatus
 
-GAP_TOLERANCE = 3e-5
-"""Largest gap in a settled pose [m], checked by a final search."""
-NEWTON_TOLERANCE = 5e-6
-"""Largest gap at which Newton's method stops [m]."""
+GAP_TOLERANCE = 3e-4
+"""Largest gap in a settled pose [wheel radii], checked by a final search."""
+NEWTON_TOLERANCE = 5e-5
+"""Largest gap at which Newton's method stops [wheel radii]."""
 MAX_NEWTON_STEPS = 6
 """Largest number of Newton steps."""
 MAX_STEP = 0.5
@@ -84,14 +84,14 @@ def settle(model, work):
     status, worst = _find_contacts(model, work, SearchScope.QUICK)
     if status != PoseStatus.SETTLED:
         return status
-    worst = np.inf
+    worst, tolerance = np.inf, GAP_TOLERANCE * model.samples.radius
     for _ in range(QUICK_ATTEMPTS):
         before = worst
         _newton(model, work)
         status, worst = _find_contacts(model, work, SearchScope.FULL)
-        if worst <= GAP_TOLERANCE or np.isnan(worst) or worst > PROMISING * before:
+        if worst <= tolerance or np.isnan(worst) or worst > PROMISING * before:
             break
-    if status == PoseStatus.SETTLED and worst > GAP_TOLERANCE:
+    if status == PoseStatus.SETTLED and worst > tolerance:
         for i in range(6):
             work.unsettled[i] = work.q[i]
         for attempt in range(RECOVERY_ATTEMPTS):
@@ -101,12 +101,12 @@ def settle(model, work):
                 work.q[0] += model.samples.radius if attempt == 1 else 0.0
                 place(model.linkage, work.pose, work.q, work.placement)
             status, worst = _recover(model, work, attempt != 2)
-            stands = worst <= GAP_TOLERANCE and not _has_turned_over(work.q)
+            stands = worst <= tolerance and not _has_turned_over(work.q)
             if status == PoseStatus.SETTLED and stands:
                 break
     if status != PoseStatus.SETTLED:
         return status
-    if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
+    if not worst <= tolerance or _has_turned_over(work.q):
         return PoseStatus.NOT_SETTLED
     for wheel in range(6):
         blend_contact(model, work, wheel)
@@ -126,6 +126,7 @@ def _recover(model, work, together):
         The worst PoseStatus, and the largest absolute gap [m]; infinite if the rover turns
         over.
     """
+    tolerance = GAP_TOLERANCE * model.samples.radius
     status, worst = _find_contacts(model, work, SearchScope.WHOLE)
     for _ in range(RECOVERIES):
         _close_gaps(model, work, worst, together)
@@ -133,7 +134,7 @@ def _recover(model, work, together):
             return PoseStatus.SETTLED, np.inf
         status, worst = _find_contacts(model, work, SearchScope.WHOLE)
         for _ in range(FINAL_ATTEMPTS):
-            if worst <= GAP_TOLERANCE or np.isnan(worst):
+            if worst <= tolerance or np.isnan(worst):
                 return status, worst
             _newton(model, work)
             status, worst = _find_contacts(model, work, SearchScope.FULL)
@@ -262,7 +263,7 @@ def _newton(model, work):
     for wheel in range(6):
         worst = max(worst, abs(work.contacts.gap[wheel]))
     for _ in range(MAX_NEWTON_STEPS):
-        if worst <= NEWTON_TOLERANCE or np.isnan(worst):
+        if worst <= NEWTON_TOLERANCE * model.samples.radius or np.isnan(worst):
             return
         if not find_step(model.linkage, work, sloped=True):
             return

@@ -21,6 +21,7 @@ from rover_physics.prediction.halving import AtFailure, Progress, Stretches
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     HEIGHT_JUMP,
+    LONGEST_STEP,
     NO_CROSSINGS,
     Crossings,
     Wheels,
@@ -217,7 +218,8 @@ def find_turns(
     """
     wheels, steps = model.wheels, steps_between(poses[:-1], poses[1:])
     swing = wheels.swing_radius * np.abs(steps[:, 2])
-    far = swing > np.maximum(wheels.radius, np.hypot(steps[:, 0], steps[:, 1]))
+    longest = LONGEST_STEP * wheels.radius
+    far = swing > np.maximum(longest, np.hypot(steps[:, 0], steps[:, 1]))
     rows = np.flatnonzero(joined & far & (results["motion"][1:, 2] != 0.0))
     pieces = np.ceil(swing[rows] / (TURN_SPACING * wheels.radius)).astype(np.int64)
     return np.column_stack([rows, pieces])

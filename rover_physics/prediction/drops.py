@@ -216,7 +216,8 @@ def _measure_drops(radius, course, rolling_off_edge, descents):
             descent = height[k - 1, wheel] - height[k, wheel]
             if not abs(descent) >= ROUNDING:
                 descent = 0.0
-            sudden = descent > HEIGHT_JUMP * radius and steps[k] <= 2.0 * MIN_SPACING
+            at_one_place = steps[k] <= 2.0 * MIN_SPACING * radius
+            sudden = descent > HEIGHT_JUMP * radius and at_one_place
             before, here = rolling_off_edge[k - 1, wheel], rolling_off_edge[k, wheel]
             if not (before or here or sudden):
                 so_far = 0.0

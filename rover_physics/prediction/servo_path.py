@@ -22,7 +22,13 @@ import numpy as np
 from rover_physics.limits.table import MIN_SPEED_SHARE, RUNAWAY
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.path_kernels import FACE, Crossings, Wheels, distances_between
+from rover_physics.prediction.path_kernels import (
+    FACE,
+    LONGEST_STEP,
+    Crossings,
+    Wheels,
+    distances_between,
+)
 from rover_physics.results.record import select_results
 from rover_physics.status import PoseStatus, Stall
 
@@ -107,7 +113,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
     nominal = speed**2 / (2.0 * gravity)
     distances = np.append(0.0, course.distances)
     stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
-    head, carried = 0.0, np.zeros(len(deficits))
+    head, carried, most = 0.0, np.zeros(len(deficits)), RUNAWAY * course.wheels.radius
     for k in np.flatnonzero(deficits).tolist():
         if k > 0 and deficits[k - 1] == 0.0:
             head = 0.0 if stands[k - 1] else share[k - 1] ** 2 * nominal[k - 1]
@@ -116,7 +122,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
         before = deficits[k - 1] if (deficits[k - 1] < 0.0) == (deficits[k] < 0.0) else 0.0
         head -= 0.5 * (before + deficits[k]) * distances[k] if distances[k] else 0.0
         head = 0.0 if stands[k] and deficits[k] > 0.0 else max(head, 0.0)
-        if MIN_SPEED_SHARE**2 * nominal[k] < head <= RUNAWAY:
+        if MIN_SPEED_SHARE**2 * nominal[k] < head <= most:
             carried[k] = head
     rolls = carried > 0.0
     share[rolls] = np.sqrt(carried[rolls] / nominal[rolls])
@@ -143,11 +149,12 @@ def _write_lift_heights(course: _Course) -> None:
 
 
 def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats:
-    """Return time [s] and energy [J] (n, 2) by which climbs exceed what `add_up` counts.
+    """Return time [s] and energy [J] (n, 2) that climbs take beside what `add_up` counts.
 
     A wheel that climbs takes its time while the body hardly moves. The distance that the rover
     goes is the mean of those of its wheel centres; a wheel that goes down more steeply than 45
-    degrees falls, which takes no time. Both are sums since the first waypoint, over the steps
+    degrees falls, which takes no time. Meanwhile the others slip: that energy is their power in
+    the time. Both are sums since the first waypoint, over the steps
     between settled waypoints that have poses between them.
 
     Args:
@@ -195,7 +202,7 @@ def _find_drift(course: _Course, window: float) -> Floats:
             turns, of its outermost wheel.
     """
     wheels, poses, crossings = course.wheels, course.waypoints, course.crossings
-    long_steps = np.append(False, distances_between(wheels, poses) > wheels.radius)
+    long_steps = np.append(False, distances_between(wheels, poses) > LONGEST_STEP * wheels.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
     course = _Course(wheels, poses, course.results, turns)
     share, deviation = course.values("speed_share"), course.values("deviation")

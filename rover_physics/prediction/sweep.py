@@ -195,7 +195,7 @@ def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> 
 
     Returns:
         The prediction, as a sweep over the reversed poses gives it, apart from rounding. `power`
-        and `energy` are those of the way in.
+        is that of the way in.
     """
     first, end = waypoints.start, waypoints.stop
     n = end - first
@@ -406,13 +406,13 @@ def _sum_up(
         time, energy = climb_costs(poses, results, before)[-1]
         start = (start[0], start[1] + time, start[2] + energy)
     path, sums = (view_read_only(poses), view_read_only(results)), np.empty((3, len(poses)))
-    return add_up(*path, model.record.linkage.steering_rate, start, sums)
+    return add_up(*path, model.wheels, start, sums)
 
 
 def _write_sums(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> None:
     """Write distance, time and energy at poses (n, 3) into their RESULTs."""
-    sums, rate = np.empty((3, len(poses))), model.record.linkage.steering_rate
-    add_up(view_read_only(poses), view_read_only(results), rate, start, sums)
+    sums = np.empty((3, len(poses)))
+    add_up(view_read_only(poses), view_read_only(results), model.wheels, start, sums)
     results["distance"], results["time"], results["energy"] = sums
 
 

@@ -49,6 +49,8 @@ RUN_UP = 1.0
 """Distance [wheelbases] before the first place that needs a check where the way back ends."""
 MAX_WAY_POSES = 5000
 """Largest number of steps of a way on; poses of a path may be arbitrarily close together."""
+SPACING = 0.2
+"""Step of a way on of a path that goes nowhere [wheel radii]."""
 UNKNOWN_CODES = ("off_map", "unknown_ground")
 """Codes that close a way on only within LOOK_AHEAD wheelbases; farther ground may be open."""
 
@@ -213,7 +215,7 @@ def _explain_no_way_on(model: PackedModel, course: Course, inside: slice) -> str
     if room > wheelbase:
         behind = distance[inside.start] + 0.5 * wheelbase
         starts.append(int(np.searchsorted(distance, behind)))
-    steps = count_steps(course.path, length)
+    steps = count_steps(course.path, length, model.rover.wheel.radius)
     ahead = np.linspace(0.0, length, steps + 1)
     closed = ""
     for start in starts:
@@ -247,12 +249,12 @@ def _paths_ahead(
         yield np.column_stack([places, yaw])
 
 
-def count_steps(path: np.ndarray, length: float) -> int:
+def count_steps(path: np.ndarray, length: float, radius: float) -> int:
     """Return the number of steps of a path of `length` [m], about as long as those of a path.
 
-    Their median counts, of poses that are apart.
+    Their median counts, of poses that are apart; without any, SPACING of wheels of `radius` [m].
     """
     steps = np.hypot(*np.diff(path[:, :2], axis=0).T)
     steps = steps[steps > 0.0]
-    spacing = float(np.median(steps)) if steps.size else 0.02
+    spacing = float(np.median(steps)) if steps.size else SPACING * radius
     return min(int(np.ceil(length / spacing - 1e-6)), MAX_WAY_POSES)

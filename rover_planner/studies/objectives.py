@@ -16,14 +16,13 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
+from rover_planner.planning.path_query import waypoint_spacing_for
 from rover_planner.studies.study_file import STEP_TOLERANCE, Study, StudyDrive
 
-SPACING = 0.02
-"""Distance between waypoints [m]."""
 NO_LIMIT = 1e9
 """Value that disables a limit."""
-SEARCH_STEP = 0.02
-"""Increment of step heights in the search, before bisection [m]."""
+SEARCH_STEPS = 5.0
+"""Number of step heights in a wheel radius that are tried, before bisection."""
 MAX_STEP = 10.0
 """Tallest step that is tried [m]."""
 MAX_WAYPOINTS = 200_000
@@ -62,7 +61,7 @@ def level_loads(rover: Rover) -> Floats:
 def _score_drive(study: Study, rover: Rover, k: int) -> tuple[float, str]:
     """Return objective and note of drive k; all limits must hold except that of the objective."""
     drive, where = study.drives[k], f"drive {k + 1}"
-    path = drive.length * np.linspace(0.0, 1.0, _count_steps(drive.length) + 1)
+    path = drive.length * np.linspace(0.0, 1.0, _count_steps(rover, drive.length) + 1)
     x, y, yaw = drive.start
     poses = np.column_stack(
         [x + path * np.cos(yaw), y + path * np.sin(yaw), np.full_like(path, yaw)]
@@ -85,17 +84,18 @@ def _score_drive(study: Study, rover: Rover, k: int) -> tuple[float, str]:
     return verdict.min_tip_over_ratio * flat_angle, where
 
 
-def _count_steps(length: float) -> int:
-    """Return the number of steps of about SPACING along a length [m], at least 1.
+def _count_steps(rover: Rover, length: float) -> int:
+    """Return the number of steps from waypoint to waypoint along a length [m], at least 1.
 
     Raises:
         ModelError: There are more than MAX_WAYPOINTS.
     """
-    if not length / SPACING <= MAX_WAYPOINTS:
+    spacing = waypoint_spacing_for(rover)
+    if not length / spacing <= MAX_WAYPOINTS:
         raise ModelError(
-            f"a drive is {length:g} m long; it must be at most {MAX_WAYPOINTS * SPACING:g} m"
+            f"a drive is {length:g} m long; it must be at most {MAX_WAYPOINTS * spacing:g} m"
         )
-    return max(round(length / SPACING), 1)
+    return max(round(length / spacing), 1)
 
 
 def _make_axis(half: float, cell: float, aspect: float = 1.0) -> Floats:
@@ -160,10 +160,11 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
     margin, clearance and drop. Heights are tried from low to high, because a rover may climb a
     step that is higher than one that it cannot climb.
     """
-    climbed, height = 0.0, SEARCH_STEP
+    step = rover.wheel.radius / SEARCH_STEPS
+    climbed, height = 0.0, step
     highest = min(4.0 * rover.wheel.radius, MAX_STEP)
     while height < highest and not why_not_climbed(rover, height, policy, friction):
-        climbed, height = height, height + SEARCH_STEP
+        climbed, height = height, height + step
     low, high = climbed, height
     while high - low > STEP_TOLERANCE:
         middle = 0.5 * (low + high)
@@ -181,7 +182,7 @@ def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | 
     )
     able = replace(rover, limits=limits)
     half = 0.75 * _length(rover)
-    x = np.linspace(-half, half, _count_steps(2.0 * half) + 1)
+    x = np.linspace(-half, half, _count_steps(rover, 2.0 * half) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
     judged = judge_paths(
         able,
