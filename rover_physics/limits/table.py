@@ -238,8 +238,3 @@ LIMITS: tuple[Limit, ...] = (
     ),
 )  # fmt: skip
 """All limits, in the order in which they become the reason of a row."""
-
-
-def optional_keys() -> tuple[str, ...]:
-    """Return the keys below `limits:` of a rover file that rows of the table read."""
-    return tuple(limit.key for limit in LIMITS if limit.key)

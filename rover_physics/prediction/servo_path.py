@@ -52,13 +52,8 @@ def write_servo_path(
     course = _Course(model.wheels, poses, results, crossings)
     _carry_by_momentum(course, float(model.record.linkage.gravity))
     _stop_in_slots(course)
-    results["drift"] = _find_drift(course, drift_window(model))
-    results["lift_height"], crossings.results["lift_height"] = _find_lift_heights(course)
-
-
-def drift_window(model: PackedModel) -> float:
-    """Return the way before a waypoint within which drift counts [m]: the rover's length."""
-    return float(model.record.linkage.length)
+    results["drift"] = _find_drift(course, model.rover.wheelbase)
+    _write_lift_heights(course)
 
 
 class _Course:
@@ -67,9 +62,7 @@ class _Course:
     def __init__(self, wheels: Wheels, poses: Floats, results: Any, crossings: Crossings):
         self.wheels, self.crossings = wheels, crossings
         self.waypoints, self.results = poses, results
-        places = np.append(np.arange(len(poses)), crossings.place)
-        self.order = np.lexsort((np.arange(len(places)) >= len(poses), places))
-        """Rows of this order: of the waypoints, numbered from 0, and then of the others."""
+        self.order = crossings.order_among(len(poses))
         self.poses = np.concatenate([poses, crossings.poses])[self.order]
 
     @cached_property
@@ -139,12 +132,12 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
         course.write(name, np.where(rolls, np.minimum(values, 1.0), values))
 
 
-def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
-    """Return the heights (n, 6), (m, 6) [m] to which wheels have lifted, at waypoints and between.
+def _write_lift_heights(course: _Course) -> None:
+    """Write the heights [m] to which wheels have lifted, at waypoints and between.
 
     Poses at one place, as while a wheel climbs a face, add nothing.
     """
-    rate, n = course.values("lift_rate"), len(course.waypoints)
+    rate = course.values("lift_rate")
     heights = np.zeros(rate.shape)
     if (rate > 0.0).any():
         share = course.values("speed_share")
@@ -152,8 +145,7 @@ def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
         for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * course.distances[k - 1]
             heights[k] = np.where(rate[k] > 0.0, heights[k - 1] + rise, 0.0)
-    heights[course.order] = heights.copy()
-    return heights[:n], heights[n:]
+    course.write("lift_height", heights)
 
 
 def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats:
