@@ -63,7 +63,8 @@ class TorquePolicy(IntEnum):
 
 
 class Stall(IntEnum):
-    """Why no forward speed of a rover on speed servos balances; SLIDING also where one does."""
+    """Why a rover stands: no forward speed of its servos balances, or, under every policy, a wheel
+    is wedged. SLIDING also where it drives."""
 
     SLIDING = 0
     """The wheels slide."""
