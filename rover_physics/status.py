@@ -63,8 +63,7 @@ class TorquePolicy(IntEnum):
 
 
 class Stall(IntEnum):
-    """Why a rover stands: no forward speed of its servos balances, or, under every policy, a wheel
-    is wedged. SLIDING also where it drives."""
+    """Why a rover stands, with torque policies that a wheel is wedged; SLIDING where it drives."""
 
     SLIDING = 0
     """The wheels slide."""
