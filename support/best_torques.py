@@ -17,7 +17,7 @@ def solve_forces(rover, prediction, i, cost, max_torque, friction_share=1.0, sha
 
     Forces are in units of the weight. The unknowns are N (6), T (6) and the lateral forces, which
     are s0 + s1 along the rover where `shared`, else each wheel has its own. A share of the
-    friction may be used.
+    friction may be used. On soil, strength and resistance are in proportion to the load.
     """
     A, b, along = balance_matrix(rover, prediction, i)
     sideways = np.column_stack([np.ones(6), along])
@@ -26,8 +26,11 @@ def solve_forces(rover, prediction, i, cost, max_torque, friction_share=1.0, sha
         sideways = np.eye(6)
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.zeros((6, SIDES, A.shape[1]))
+    resistance = prediction.motion_resistance[i] / prediction.wheel_loads[i]
+    strength = friction_share * (prediction.friction[i] + resistance)
+    back = friction_share * np.sign(prediction.wheel_speed[i]) * resistance
     for wheel in range(6):
-        rows[wheel, :, wheel] = -friction_share * prediction.friction[i, wheel]
+        rows[wheel, :, wheel] = np.cos(turns) * back[wheel] - strength[wheel]
         rows[wheel, :, 6 + wheel] = np.cos(turns)
         rows[wheel, :, 12:] = np.outer(np.sin(turns), sideways[wheel])
     rows = rows.reshape(-1, A.shape[1])

@@ -89,14 +89,25 @@ def random_poses(seed: int, count: int, half: float) -> np.ndarray:
     return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
 
 
+def enlarged(ground: Terrain, size: float) -> Terrain:
+    """Return a ground that is `size` times as large in all directions."""
+    x, y = ground.origin
+    std = ground.elevation_std
+    return replace(
+        ground,
+        elevation=ground.elevation * size,
+        resolution=ground.resolution * size,
+        origin=(x * size, y * size),
+        elevation_std=None if std is None else std * size,
+    )
+
+
 def scaled_for(
     rover: Rover, ground: Terrain, poses: np.ndarray, radius: float = 0.1
 ) -> tuple[Terrain, np.ndarray]:
     """Return ground and poses as large for a rover as they are for one with wheels of `radius`."""
     size = rover.wheel.radius / radius
-    x, y = ground.origin
-    scaled = Terrain(ground.elevation * size, ground.resolution * size, (x * size, y * size))
-    return scaled, poses * [size, size, 1.0]
+    return enlarged(ground, size), poses * [size, size, 1.0]
 
 
 def _grid(half: float) -> tuple[np.ndarray, np.ndarray]:

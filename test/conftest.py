@@ -20,7 +20,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 LONGEST = (
     "test_page", "test_docs_blocks", "test_session", "test_mission_planner", "test_demo",
-    "test_served_page", "test_ways", "test_path_search", "test_warm_up", "test_simulator",
+    "test_served_page", "test_paths_around", "test_path_search", "test_warm_up", "test_simulator",
     "test_advice", "test_reachable", "test_parts_of_paths", "test_survey_command",
 )  # fmt: skip
 """Files that take longest. They begin first, so that none is left alone on one core at the end."""

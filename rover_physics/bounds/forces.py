@@ -83,7 +83,7 @@ def bound_forces(model, work):
     rover, box, settings = work.rover, work.box, model.settings
     _fill_box(work.spread, work.contact_bounds, box)
     place(model.linkage, rover.pose, work.spread.q, rover.placement)
-    _find_grounds(model, rover.placement, work.contact_bounds, box)
+    _find_grounds(model, work)
     equal = settings.policy == TorquePolicy.EQUAL or settings.on_soil
     box.columns = 1 if equal else 1 + FREE_FORCES
     if not _choose_torques(model, work):
@@ -122,13 +122,13 @@ def _fill_box(spread, contact_bounds, box):
 
 
 @kernel
-def _find_grounds(model, placement, contact_bounds, box):
+def _find_grounds(model, work):
     """Write friction and soils of all cells that each wheel of the placed rover may touch."""
-    ground, samples, settings = model.ground, model.samples, model.settings
+    ground, settings, box = model.ground, model.settings, work.box
     cell = 1.0 / ground.inverse_resolution
     layered = ground.friction != 0 or ground.soil != 0
     for wheel in range(6):
-        left, right, near, far = _find_footprint(samples, placement, wheel, contact_bounds)
+        left, right, near, far = _find_footprint(model, work, wheel)
         box.mu_low[wheel], box.mu_high[wheel] = np.inf, 0.0
         box.soil_count[wheel] = 0
         columns = int((right - left) / cell) + 2 if layered else 1
@@ -143,8 +143,13 @@ def _find_grounds(model, placement, contact_bounds, box):
 
 
 @kernel
-def _find_footprint(samples, placement, wheel, contact_bounds):
-    """Return smallest and largest x and y [m] of the points of a wheel that may touch."""
+def _find_footprint(model, work, wheel):
+    """Return smallest and largest x and y [m] of the points of a wheel that may touch.
+
+    The wheel itself moves forward or back with the configuration, and sideways about as far.
+    """
+    radius, placement, moved = model.samples.radius, work.rover.placement, work.spread.shift[wheel]
+    contact_bounds = work.contact_bounds
     left = near = np.inf
     right = far = -np.inf
     for corner in range(4):
@@ -154,9 +159,9 @@ def _find_footprint(samples, placement, wheel, contact_bounds):
         if corner % 2 == 1:
             across = contact_bounds.lateral_high[wheel]
         turn = np.sin(angle), np.cos(angle)
-        x, y, _ = point_of_rim(samples.radius, placement, (wheel, across), turn)
+        x, y, _ = point_of_rim(radius, placement, (wheel, across), turn)
         left, right, near, far = min(left, x), max(right, x), min(near, y), max(far, y)
-    return left, right, near, far
+    return left - moved, right + moved, near - moved, far + moved
 
 
 @kernel
@@ -179,11 +184,9 @@ def _choose_torques(model, work):
     if not _evaluate(model, work):
         return False
     if box.columns > 1:
-        weight = linkage.mass * linkage.gravity
         for wheel in range(6):
             rover.search.mu[wheel] = box.mu_low[wheel]
-        largest = model.settings.allowed_torque / (linkage.radius * weight)
-        minimise_friction(rover.balance, largest, rover.search)
+        minimise_friction(linkage, model.settings, rover.balance, rover.search)
         return _evaluate(model, work)
     return True
 

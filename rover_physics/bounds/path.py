@@ -215,8 +215,9 @@ def bound_pose(uncertain, nominal, work, result):
         return BoundStatus.SINGULAR
     _write_configuration(spread, result)
     _write_tip_over(model.settings, box, result)
+    moved = _load_moved(model.linkage, nominal, box)
     for wheel in range(6):
-        _write_wheel(model, wheel, box, result)
+        _write_wheel(model, (wheel, moved), box, result)
     if model.settings.policy != TorquePolicy.EQUAL:
         _let_torques_follow(model.settings, work.rover.search, result)
     return BoundStatus.BOUNDED
@@ -245,9 +246,22 @@ def _write_tip_over(settings, box, result):
 
 
 @kernel
-def _write_wheel(model, wheel, box, result):
-    """Write the bounds on load, sinkage, torque saturation and utilisation of a wheel."""
-    ground, linkage, settings = model.ground, model.linkage, model.settings
+def _load_moved(linkage, nominal, box):
+    """Return the largest load [N] that the policy's torques move from those of the box."""
+    weight, moved = linkage.mass * linkage.gravity, 0.0
+    for wheel in range(6):
+        load = weight * box.base_value[LOAD_OUTPUTS + wheel]
+        moved = max(moved, abs(nominal.wheel_loads[wheel] - load))
+    return moved
+
+
+@kernel
+def _write_wheel(model, load, box, result):
+    """Write the bounds on load, sinkage, torque saturation and utilisation of a wheel.
+
+    `load` is (wheel, `_load_moved`): the best torques on soil move loads on any map about as far.
+    """
+    ground, linkage, settings, (wheel, moved) = model.ground, model.linkage, model.settings, load
     weight = linkage.mass * linkage.gravity
     lightest = weight * box.smallest[LOAD_OUTPUTS + wheel]
     heaviest = weight * box.largest[LOAD_OUTPUTS + wheel]
@@ -263,11 +277,12 @@ def _write_wheel(model, wheel, box, result):
         for k in range(box.soil_count[wheel]):
             copy_soil(ground, box.soils[wheel, k], soil)
             own = SoilWheel(linkage.radius, linkage.width, 1.0)
-            light = solve_wheel(soil, own, lightest, 0.0, 0.0)
-            heavy = solve_wheel(soil, own, heaviest, 0.0, 0.0)
+            light = solve_wheel(soil, own, lightest - moved, 0.0, 0.0)
+            heavy = solve_wheel(soil, own, heaviest + moved, 0.0, 0.0)
             shallowest = min(shallowest, light.sinkage)
             deepest = max(deepest, heavy.sinkage)
-            resistance = max(resistance, heavy.resistance)
+            by_equal = solve_wheel(soil, own, heaviest, 0.0, 0.0)
+            resistance = max(resistance, by_equal.resistance)
     result.sinkage[wheel, 0], result.sinkage[wheel, 1] = shallowest, deepest
     result.torque_saturation[wheel, 0] = linkage.radius * least / settings.max_torque
     result.torque_saturation[wheel, 1] = linkage.radius * (most + resistance) / settings.max_torque
@@ -297,8 +312,8 @@ def _let_torques_follow(settings, search, result):
         most_torque = max(most_torque, most_use * allowed)
     for k in range(FREE_TORQUES, FREE_FORCES):
         if search.y[k] != 0.0:
-            # Lateral forces differ from equal shares only if equal shares would slip.
-            most_use = max(most_use, 1.0)
+            # Lateral forces differ from equal shares only if these need more than is allowed.
+            most_use = max(most_use, settings.allowed_friction)
     for wheel in range(6):
         result.friction_utilisation[wheel, 0] = result.torque_saturation[wheel, 0] = 0.0
         result.friction_utilisation[wheel, 1] = most_use

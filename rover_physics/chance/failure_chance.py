@@ -189,9 +189,9 @@ def _find_near(
         return near
     sums = [row.reads in SUMS for row in model.limits.rows]
     n, distance = len(swept.prediction.poses), swept.prediction.distance
-    window, leads = float(model.record.linkage.length), np.zeros(n, bool)
+    leads = np.zeros(n, bool)
     for i in np.flatnonzero(np.fmax.reduce(uses[:n][:, sums], axis=1, initial=0.0) > least):
-        leads[np.searchsorted(distance, distance[i] - window) : i + 1] = True
+        leads[np.searchsorted(distance, distance[i] - model.rover.wheelbase) : i + 1] = True
     return np.asarray(near | np.append(leads, leads[swept.crossings.waypoint]))
 
 

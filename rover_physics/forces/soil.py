@@ -143,16 +143,27 @@ def effective_friction(soil, wheel, N):
     unless MIN_FRICTION applies. For Bekker-Wong it depends on the load. `soil` is a row of
     `pack_soils`, `wheel` a SoilWheel.
     """
-    mu, radius, width = wheel.friction, wheel.radius, wheel.width
     if soil[SOIL_MODEL] == COULOMB:
-        return _own_friction(soil, mu)
+        return _own_friction(soil, wheel.friction)
     if not N > 0.0:
         return MIN_FRICTION
-    sinkage = find_sinkage(soil, radius, width, N)
-    length = contact_length(radius, sinkage)
-    strength = shear_strength(soil, width * length, N)
-    thrust = _largest_thrust(soil, radius, sinkage, length, strength)
-    return max((thrust - motion_resistance(soil, width, sinkage)) / N, MIN_FRICTION)
+    strength, resistance = grip_on(soil, wheel, N)
+    return max(strength - resistance, MIN_FRICTION)
+
+
+@kernel
+def grip_on(soil, wheel, N):
+    """Return the thrust at slip 1, at least MIN_FRICTION, and the resistance, over the load N [N].
+
+    `soil` is a row of `pack_soils`, `wheel` a SoilWheel.
+    """
+    if soil[SOIL_MODEL] == COULOMB:
+        return _own_friction(soil, wheel.friction), 0.0
+    sinkage = find_sinkage(soil, wheel.radius, wheel.width, N)
+    length = contact_length(wheel.radius, sinkage)
+    strength = shear_strength(soil, wheel.width * length, N)
+    thrust = _largest_thrust(soil, wheel.radius, sinkage, length, strength)
+    return max(thrust / N, MIN_FRICTION), motion_resistance(soil, wheel.width, sinkage) / N
 
 
 @kernel

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wheel forces on soil, where friction and resistance depend on the wheel loads."""
+"""Wheel forces on soil, where strength and resistance depend on the wheel loads."""
 
 import numpy as np
 
-from rover_physics.forces.soil import SoilWheel, effective_friction, solve_wheel
-from rover_physics.forces.torques import apply_torques, minimise_friction
+from rover_physics.forces.soil import SOIL_FRICTION, SoilWheel, grip_on, solve_wheel
+from rover_physics.forces.torques import LOAD_KEPT, apply_torques, minimise_friction
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import copy_soil, soil_row_at
@@ -17,8 +17,9 @@ ROUNDS = 3
 def share_forces_on_soil(model, work):
     """Find the wheel forces of the policy on soil and write them into `work.search`.
 
-    The first search uses friction and resistance at the loads of equal torques, the next ones
-    those at the loads found. The best of these sets is kept; equal torques are one of them.
+    Strength and resistance count as proportional to the load: in the first search as at the loads
+    of equal torques, in the next ones as at the loads found. The best of these sets is kept; equal
+    torques are one of them.
 
     Args:
         model: A record with `ground` GROUND, `linkage` LINKAGE and `settings` SETTINGS.
@@ -27,10 +28,10 @@ def share_forces_on_soil(model, work):
     """
     ground, linkage, settings = model.ground, model.linkage, model.settings
     search, best = work.search, work.best
-    weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         copy_soil(ground, soil_row_at(ground, x, y), work.soils[wheel])
+        work.soils[wheel, SOIL_FRICTION] *= settings.friction_factor[wheel]
     apply_torques(work.balance, np.int64(0), search)
     if settings.policy == TorquePolicy.EQUAL:
         return
@@ -38,9 +39,7 @@ def share_forces_on_soil(model, work):
     _copy(search, best)
     for _ in range(ROUNDS):
         _write_grip(linkage, work)
-        minimise_friction(
-            work.balance, settings.allowed_torque / (linkage.radius * weight), search
-        )
+        minimise_friction(linkage, settings, work.balance, search)
         needed = _needed(linkage, settings, work)
         if needed <= least:
             least = needed
@@ -65,17 +64,14 @@ def _copy(search, best):
 
 @kernel
 def _write_grip(linkage, work):
-    """Write friction and resistance at the current loads into the search."""
+    """Write strength and resistance over the load, at the current loads, into the search."""
     search = work.search
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
-        soil = work.soils[wheel]
-        N = weight * search.wheel_loads[wheel]
+        N = weight * max(search.wheel_loads[wheel], LOAD_KEPT)
         own = SoilWheel(linkage.radius, linkage.width, search.mu[wheel])
-        solved = solve_wheel(soil, own, N, 0.0, 0.0)
-        search.mu[wheel] = effective_friction(soil, own, N)
-        direction = rolling_direction(work, wheel)
-        search.resistance[wheel] = direction * solved.resistance / weight
+        search.mu[wheel], resistance = grip_on(work.soils[wheel], own, N)
+        search.resistance[wheel] = rolling_direction(work, wheel) * resistance
 
 
 @kernel

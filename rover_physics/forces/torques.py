@@ -3,9 +3,10 @@
 
 Three minimisations run in turn, the first two only until their constraint holds: keep all wheels
 on the ground; keep the torques within their limit; minimise the friction utilisation u with
-sqrt(T^2 + S^2) <= u mu N. Each minimises the level of a family of convex sets by the method of
-centres: damped Newton steps on a self-concordant barrier lead to the analytic centre of the set at
-a level, then the level is lowered towards the value that the centre needs.
+sqrt((T + u R)^2 + S^2) <= u mu N, where R is the resistance of soil. Each minimises the level of a
+family of convex sets by the method of centres: damped Newton steps on a self-concordant barrier
+lead to the analytic centre of the set at a level, then the level is lowered towards the value that
+the centre needs.
 
 Source: Boyd and El Ghaoui, "Method of centers for minimizing generalized eigenvalues", Linear
 Algebra and its Applications 188, 1993.
@@ -16,6 +17,7 @@ from enum import IntEnum
 import numpy as np
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
+from rover_physics.forces.soil import use_of_shear
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.numerics.records import record_type
@@ -58,9 +60,9 @@ TORQUE_SEARCH = record_type(
     ("wheel_loads", float, (6,)),  # N at y
     ("tangential", float, (6,)),  # T at y
     ("lateral", float, (6,)),  # S at y
-    ("mu", float, (6,)),  # friction coefficients
+    ("mu", float, (6,)),  # largest shear forces over the loads: the friction coefficients
     ("max_traction", float),  # largest torque over wheel radius; infinite: no limit
-    ("resistance", float, (6,)),  # motion resistances; torque over radius is T + resistance
+    ("resistance", float, (6,)),  # motion resistances R over the loads, as the wheels roll
     ("H", float, (FREE_FORCES, FREE_FORCES)),  # Hessian of the barrier
     ("g", float, (FREE_FORCES, 1)),  # gradient of the barrier, then the Newton step
     ("gradient", float, (FREE_FORCES,)),  # copy of the gradient
@@ -85,21 +87,24 @@ def apply_torques(balance, free, search):
 
 
 @kernel
-def minimise_friction(balance, max_traction, search):
+def minimise_friction(linkage, settings, balance, search):
     """Find the torques that need the least friction and write their forces into `search`.
 
     The search starts from equal torques. Lateral forces keep their equal shares if these are
-    feasible. Otherwise they are free, and wheels with friction in reserve take over. If no torques
-    within their limit keep all wheels on the ground, the forces are those closest to that.
+    within the allowed friction. Otherwise they are free, and wheels with friction in reserve take
+    over. If no torques within their limit keep all wheels on the ground, the forces are those
+    closest to that.
 
     Args:
+        linkage: LINKAGE.
+        settings: SETTINGS.
         balance: BALANCE with all columns.
-        max_traction: Largest torque over wheel radius and rover weight.
         search: TORQUE_SEARCH; reads `mu` and `resistance`.
     """
-    most = min(max_traction, MOST_TRACTION)
+    weight = linkage.mass * linkage.gravity
+    most = min(settings.allowed_torque / (linkage.radius * weight), MOST_TRACTION)
     found = _search(balance, np.int64(FREE_TORQUES), most, search)
-    if not found or _needed(search, SearchGoal.FRICTION) > 1.0:
+    if not found or _needed(search, SearchGoal.FRICTION) > settings.allowed_friction:
         _search(balance, np.int64(FREE_FORCES), most, search)
 
 
@@ -130,12 +135,27 @@ def _needed(search, goal):
         if goal == SearchGoal.LOAD:
             level = -search.wheel_loads[i]
         elif goal == SearchGoal.TORQUE:
-            level = abs(search.tangential[i] + search.resistance[i])
+            level = abs(_thrust(search, i))
+        elif _pulls_itself(search, i):
+            N, T, S = search.wheel_loads[i], search.tangential[i], search.lateral[i]
+            level = use_of_shear(T, S, search.resistance[i] * N, search.mu[i] * N)
         else:
-            T, S = search.tangential[i], search.lateral[i]
-            level = np.sqrt(T * T + S * S) / (search.mu[i] * search.wheel_loads[i])
+            shear = np.hypot(_thrust(search, i), search.lateral[i])
+            level = shear / (search.mu[i] * search.wheel_loads[i])
         worst = max(worst, level)
     return worst
+
+
+@kernel
+def _thrust(search, i):
+    """Return the torque of wheel i over its radius, T + R."""
+    return search.tangential[i] + search.resistance[i] * search.wheel_loads[i]
+
+
+@kernel
+def _pulls_itself(search, i):
+    """Return whether the thrust of wheel i may exceed its resistance; if not, others drag it."""
+    return search.mu[i] > abs(search.resistance[i])
 
 
 @kernel
@@ -187,16 +207,18 @@ def _write_barrier(balance, free, goal, level, search):
     traction = level if goal == SearchGoal.TORQUE else search.max_traction
     for i in range(6):
         if goal == SearchGoal.FRICTION:
-            _add_cone(balance, free, i, level * search.mu[i], search)
+            _add_cone(balance, free, i, level, search)
         else:
             room = search.wheel_loads[i] + (level if goal == SearchGoal.LOAD else 0.0)
-            _add_log(free, balance.normal[i], 1.0 / room, 1.0 / (room * room), search)
+            load = 1.0, 0.0, 1.0 / room, 1.0 / (room * room)
+            _add_log(balance, free, i, load, search)
         if traction < np.inf:
-            thrust = search.tangential[i] + search.resistance[i]
+            thrust = _thrust(search, i)
             above, below = traction - thrust, traction + thrust
             slope = 1.0 / below - 1.0 / above
             curvature = 1.0 / (below * below) + 1.0 / (above * above)
-            _add_log(free, balance.tangential[i], slope, curvature, search)
+            torque = search.resistance[i], 1.0, slope, curvature
+            _add_log(balance, free, i, torque, search)
 
     for j in range(free):
         for k in range(j):
@@ -204,25 +226,39 @@ def _write_barrier(balance, free, goal, level, search):
 
 
 @kernel
-def _add_log(free, row, slope, curvature, search):
-    """Add the barrier -log of a linear slack with gradient row[1:]; only the lower half of H."""
+def _add_log(balance, free, i, slack, search):
+    """Add the barrier -log of a linear slack of wheel i; only the lower half of H.
+
+    `slack` holds the shares of N and T in it, then slope and curvature of the barrier.
+    """
+    of_load, of_traction, slope, curvature = slack
+    n, t = balance.normal, balance.tangential
     for j in range(free):
-        search.g[j, 0] -= slope * row[1 + j]
+        row = of_load * n[i, 1 + j] + of_traction * t[i, 1 + j]
+        search.g[j, 0] -= slope * row
         for k in range(j + 1):
-            search.H[j, k] += curvature * row[1 + j] * row[1 + k]
+            other = of_load * n[i, 1 + k] + of_traction * t[i, 1 + k]
+            search.H[j, k] += curvature * row * other
 
 
 @kernel
-def _add_cone(balance, free, i, mu, search):
-    """Add the barrier -log((mu N)^2 - T^2 - S^2) of wheel i; only the lower half of H."""
+def _add_cone(balance, free, i, level, search):
+    """Add the barrier -log((u mu N)^2 - (T + u R)^2 - S^2) of wheel i at level u.
+
+    Only the lower half of H is written. For a wheel that others drag, R has no factor u.
+    """
     n, t, s = balance.normal, balance.tangential, balance.lateral
-    N, T, S = search.wheel_loads[i], search.tangential[i], search.lateral[i]
+    mu, back = level * search.mu[i], search.resistance[i]
+    if _pulls_itself(search, i):
+        back *= level
+    N, S = search.wheel_loads[i], search.lateral[i]
+    T = search.tangential[i] + back * N
     room = mu * mu * N * N - T * T - S * S
     for j in range(free):
-        nj, tj, sj = mu * mu * n[i, 1 + j], t[i, 1 + j], s[i, 1 + j]
+        nj, tj, sj = mu * mu * n[i, 1 + j], t[i, 1 + j] + back * n[i, 1 + j], s[i, 1 + j]
         gj = 2.0 * (N * nj - T * tj - S * sj) / room
         search.g[j, 0] -= gj
         for k in range(j + 1):
-            nk, tk, sk = n[i, 1 + k], t[i, 1 + k], s[i, 1 + k]
+            nk, tk, sk = n[i, 1 + k], t[i, 1 + k] + back * n[i, 1 + k], s[i, 1 + k]
             gk = 2.0 * (mu * mu * N * nk - T * tk - S * sk) / room
             search.H[j, k] += gj * gk - 2.0 * (nj * nk - tj * tk - sj * sk) / room

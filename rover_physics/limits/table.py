@@ -18,9 +18,9 @@ MODERATE_SINKAGE = 1.0 / 6.0
 MIN_SPEED_SHARE = 0.05
 """Least share of the commanded motion with which a rover drives. A servo at its torque limit still
 turns; below this share the rover grinds on the spot."""
-RUNAWAY = 0.01
-"""Height [m] of the fall whose speed, 0.44 m/s on Earth, a rover may reach that its motors cannot
-hold."""
+RUNAWAY = 0.1
+"""Height [wheel radii] of the fall whose speed a rover may reach that its motors cannot hold:
+0.44 m/s on Earth with wheels of 0.1 m."""
 MAX_TURN_OFF = 0.1
 """Largest turn [rad] off its path that a rover with speed servos may make within its wheelbase: a
 curvature error that would double the width of its track within about two lengths."""
@@ -238,8 +238,3 @@ LIMITS: tuple[Limit, ...] = (
     ),
 )  # fmt: skip
 """All limits, in the order in which they become the reason of a row."""
-
-
-def optional_keys() -> tuple[str, ...]:
-    """Return the keys below `limits:` of a rover file that rows of the table read."""
-    return tuple(limit.key for limit in LIMITS if limit.key)

@@ -21,6 +21,7 @@ from rover_physics.prediction.halving import AtFailure, Progress, Stretches
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     HEIGHT_JUMP,
+    LONGEST_STEP,
     NO_CROSSINGS,
     Crossings,
     Wheels,
@@ -137,7 +138,7 @@ def _halve(model: PackedModel, known: Crossings, searched: Searched) -> Crossing
         more = numbers[Progress.ROWS] - len(found.place) + POSES_IN_STRETCH * stretches + 2
         found = join_crossings([found, _unasked(more)])
         rows = len(found.place)
-        ends, closed = (_lengthen(array, rows) for array in (ends, closed))
+        ends, closed = (np.resize(pairs, (rows, 2)) for pairs in (ends, closed))
         asked = Stretches(ends, found.place, found.waypoint, closed, numbers, *searched)
         written, motions = (found.results, numbers_of(found.results)), np.empty((rows, 3))
         places = found.poses, motions, NONE_HELD
@@ -158,13 +159,6 @@ def _unasked(count: int) -> Crossings:
         np.empty(count), np.zeros(count, np.int64), none_held(count),
         np.empty((count, 3)), new_results(count),
     )  # fmt: skip
-
-
-def _lengthen(array: NDArray[np.int64], rows: int) -> NDArray[np.int64]:
-    """Return an array with so many rows; the new ones are to be written."""
-    longer = np.empty((rows, *array.shape[1:]), array.dtype)
-    longer[: len(array)] = array
-    return longer
 
 
 def list_jumps(
@@ -224,7 +218,8 @@ def find_turns(
     """
     wheels, steps = model.wheels, steps_between(poses[:-1], poses[1:])
     swing = wheels.swing_radius * np.abs(steps[:, 2])
-    far = swing > np.maximum(wheels.radius, np.hypot(steps[:, 0], steps[:, 1]))
+    longest = LONGEST_STEP * wheels.radius
+    far = swing > np.maximum(longest, np.hypot(steps[:, 0], steps[:, 1]))
     rows = np.flatnonzero(joined & far & (results["motion"][1:, 2] != 0.0))
     pieces = np.ceil(swing[rows] / (TURN_SPACING * wheels.radius)).astype(np.int64)
     return np.column_stack([rows, pieces])

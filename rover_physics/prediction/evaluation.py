@@ -39,6 +39,7 @@ SETTINGS = record_type(
     ("friction_factor", float, (6,)),  # factor of the friction under each wheel
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
+    ("allowed_friction", float),  # largest use of friction within safety limit and control margin
     ("control_margin", float),  # share of the limits of friction and torque left to the controller
     ("servo_droop", float),  # share of the nominal speed that a servo loses at full torque
     ("friction_share", float),  # share of the friction that policy SERVO may use
@@ -358,8 +359,7 @@ def _write_forces(model, work, result):
     elif settings.policy == TorquePolicy.EQUAL:
         apply_torques(work.balance, np.int64(0), search)
     else:
-        largest = settings.allowed_torque / (linkage.radius * weight)
-        minimise_friction(work.balance, largest, search)
+        minimise_friction(linkage, settings, work.balance, search)
     power = 0.0
     for wheel in range(6):
         N = weight * search.wheel_loads[wheel]

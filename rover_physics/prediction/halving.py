@@ -72,7 +72,7 @@ class Stretches(NamedTuple):
 NO_STRETCHES = Stretches(
     np.empty((0, 2), np.int64), np.empty(0), np.empty(0, np.int64), np.empty((0, 2), np.int64),
     np.zeros(3, np.int64), np.empty(0, np.int64), np.empty(0, np.int64),
-    Wheels(0.0, 0.0, 0.0, 0.0, 0.0, False), int(AtFailure.SEARCH_ON),
+    Wheels(0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0), int(AtFailure.SEARCH_ON),
 )  # fmt: skip
 """Value of `stretches` where poses are given."""
 
@@ -131,7 +131,8 @@ def _sort_half(stretches, poses, results, before, after):
     """Close a half, ask for its middle, or leave it as it is."""
     wheels, numbers = stretches.wheels, stretches.numbers
     distance = distance_between(poses[before], poses[after], wheels.swing_radius)
-    if distance < MIN_SPACING and jumps_between(results[before], results[after], wheels):
+    is_place = distance < MIN_SPACING * wheels.radius
+    if is_place and jumps_between(results[before], results[after], wheels):
         _close(stretches, before, after)
     elif wanted_spacing(results[before], results[after], wheels) < distance:
         row = numbers[Progress.ROWS]

@@ -12,7 +12,7 @@ from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
 from rover_physics.limits import table
 from rover_physics.limits.table import Limit
-from rover_physics.names import SERVO
+from rover_physics.names import SERVO, WHEEL_POSITIONS
 from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.records import new_record
@@ -41,7 +41,7 @@ from rover_physics.results.uses import RoverLimits, SameObject, limits_of
 from rover_physics.rover.checks import check_plausible
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com, pack_tool
-from rover_physics.rover.model import Rover
+from rover_physics.rover.model import Limits, Rover
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import Ground, pack_ground, with_soils
@@ -96,6 +96,9 @@ class PackedModel:
             float(limits.torque_saturation),
             float(limits.wheel_drop),
             self.options.policy == SERVO,
+            float(self.rover.wheel.max_speed),
+            float(linkage.steering_rate),
+            WHEEL_POSITIONS.index(self.rover.suspension.rocker_wheel),
         )
 
     def change(self, **options: Any) -> "PackedModel":
@@ -233,9 +236,6 @@ def _pack_request(
         friction=float(mu),
         friction_factor=1.0,
         max_torque=float(torque),
-        allowed_torque=float(
-            torque * rover.limits.torque_saturation * (1.0 - options.kept_margin)
-        ),
         control_margin=float(options.kept_margin),
         servo_droop=float(rover.wheel.servo_droop),
         friction_share=float(rover.limits.friction_utilisation),
@@ -250,18 +250,26 @@ def _pack_request(
     return (
         pack_linkage(rover, mass, com, tool),
         sample_wheel(rover, resolution),
-        _with_fallbacks(settings, float(torque * rover.limits.torque_saturation)),
+        _with_fallbacks(settings, rover.limits),
     )
 
 
-def _with_fallbacks(settings: Any, allowed_torque: float) -> tuple[Any, ...]:
+def _with_fallbacks(settings: Any, limits: Limits) -> tuple[Any, ...]:
     """Return SETTINGS, with a control margin followed by those of the other models."""
+    _allow(settings, limits, 1.0 - settings.control_margin)
     if settings.control_margin == 0.0:
         return (settings,)
     equal, physical = settings.copy(), settings.copy()
     equal.policy, equal.control_margin = TorquePolicy.EQUAL, 0.0
-    equal.allowed_torque = physical.allowed_torque = allowed_torque
+    for one in (equal, physical):
+        _allow(one, limits, 1.0)
     return settings, equal, physical
+
+
+def _allow(settings: Any, limits: Limits, share: float) -> None:
+    """Write what a share of the safety limits of friction and torque allows into SETTINGS."""
+    settings.allowed_torque = settings.max_torque * limits.torque_saturation * share
+    settings.allowed_friction = min(limits.friction_utilisation * share, 1.0)
 
 
 @lru_cache(maxsize=4)

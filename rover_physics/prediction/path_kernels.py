@@ -5,16 +5,20 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats, view_read_only
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.results.record import join_results, new_results, select_results
 from rover_physics.status import PoseStatus
 
+LONGEST_STEP = 1.0 + 1e-6
+"""Distance [wheel radii] of neighbours up to which it is looked at what lies between: a radius,
+however the distance is rounded."""
 HEIGHT_JUMP = 0.25
 """Change of a wheel's height between two poses [wheel radii] above which it is a jump."""
-MIN_SPACING = 1e-4
-"""Distance between poses [m] below which a jump counts as at one place."""
+MIN_SPACING = 1e-3
+"""Distance between poses [wheel radii] below which a jump counts as at one place."""
 PEAK_SPACING, EDGE_SPACING = 0.01, 0.02
 """Distances [wheel radii] below which peaks of forces at a limit are not searched, and smaller
 peaks and ends of falls. With 0.06 for smaller peaks, twice as many waypoints change 5 verdicts in
@@ -40,7 +44,7 @@ AT_LIMIT = 0.95
 
 
 class Wheels(NamedTuple):
-    """Size of a rover's wheels and of the rover, and the limits of their forces."""
+    """Size of a rover's wheels and of the rover, and the limits of their forces and speeds."""
 
     radius: float
     """Wheel radius [m]."""
@@ -54,6 +58,12 @@ class Wheels(NamedTuple):
     """Largest drop of a wheel [m]."""
     on_servos: bool
     """True if wheels may be at their limits, as under policy "servo"."""
+    max_rate: float
+    """Largest wheel speed [rad/s]."""
+    steering_rate: float
+    """Largest speed of the steering [rad/s]."""
+    rocker_wheel: int
+    """Index of the right wheel that is on the rocker itself; the others hang on the bogie."""
 
 
 class Crossings(NamedTuple):
@@ -89,6 +99,10 @@ class Crossings(NamedTuple):
     def in_order(self) -> "Crossings":
         """Return the poses in path order; at a waypoint, the stretch that ends there is first."""
         return self.select(np.lexsort((self.waypoint, self.place)))
+
+    def order_among(self, waypoints: int) -> NDArray[np.int64]:
+        """Return rows in path order: a waypoint as its index, pose j of these as waypoints + j."""
+        return np.append(np.arange(waypoints), self.place).argsort(kind="stable")
 
     def between(self, first: int, end: int, start: int = 0) -> "Crossings":
         """Return the poses from waypoint `first` up to `end`, counted from `start` on."""
@@ -148,7 +162,7 @@ def find_jumps(results, poses, joined, wheels, ends):
         if not joined[row]:
             continue
         distance = distance_between(poses[row], poses[row + 1], wheels.swing_radius)
-        if not 0.0 < distance <= wheels.radius:
+        if not 0.0 < distance <= LONGEST_STEP * wheels.radius:
             continue
         if wanted_spacing(results[row], results[row + 1], wheels) < distance:
             ends[count, 0], ends[count, 1] = row, row + 1
@@ -163,7 +177,7 @@ def wanted_spacing(here, there, wheels):
         return np.inf
     if not jumps_between(here, there, wheels):
         return _finest(here, there, wheels)
-    return MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING * wheels.radius
+    return (MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING) * wheels.radius
 
 
 @exact_kernel
@@ -239,14 +253,12 @@ def _decides(here, there, wheels):
 
 @exact_kernel
 def _finest(here, there, wheels):
-    """Return the spacing [m] for a stretch in which a limit may be passed, else inf.
+    """Return the spacing [m] for a stretch in which a limit may be passed, else inf; both settle.
 
     Forces change as contacts turn, and may peak while they do. Where they are beyond at one of the
     poses, a wheel may fall there; until it does, they count. Where a fall begins or ends between
     the poses, its place counts.
     """
-    if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
-        return np.inf
     turn, passes_edge = 0.0, False
     for wheel in range(6):
         angle, other = here.contact_angle[wheel], there.contact_angle[wheel]
@@ -277,7 +289,7 @@ def _largest_use(result, wheels):
 
 
 @exact_kernel
-def add_up(poses, results, rate, start, sums):
+def add_up(poses, results, wheels, start, sums):
     """Write distance [m], time [s] and energy [J] into sums (3, n); return those at the last pose.
 
     The rover drives from pose to pose with the motion of the later one. If steering to its angles
@@ -286,8 +298,8 @@ def add_up(poses, results, rate, start, sums):
     Args:
         poses: (n, 3) x, y [m] and yaw [rad].
         results: (n,) RESULT of each pose. Time and energy are NaN where it is not settled, and
-            the climb between two poses counts only if both are settled.
-        rate: Largest speed of the steering [rad/s].
+            climb and energy between two poses count only if both are settled.
+        wheels: Wheels.
         start: Distance, time and energy at the first pose.
         sums: (3, n), written.
     """
@@ -301,11 +313,13 @@ def add_up(poses, results, rate, start, sums):
             step = np.hypot(there[0] - here[0], there[1] - here[1])
             both = settled and before.status == PoseStatus.SETTLED
             climb = result.q[0] - before.q[0] if both else 0.0
-            duration = _drive_time(step, climb, turn_between(here, there), result.motion)
+            turn = turn_between(here, there)
+            duration = _drive_time(step, climb, turn, result.motion)
             duration /= 0.5 * (_speed_share(result) + _speed_share(before))
             distance += step
-            energy += 0.5 * (_power(result) + _power(before)) * duration
-            time += max(duration, _largest_change(before, result) / rate)
+            time += max(duration, _largest_change(before, result) / wheels.steering_rate)
+            if both:
+                energy += _work(before, result, here[2], turn, duration, wheels)
         sums[0, i] = distance
         sums[1, i] = time if settled else np.nan
         sums[2, i] = energy if settled else np.nan
@@ -341,8 +355,55 @@ def _largest_change(before, after):
 
 
 @exact_kernel
-def _power(result):
-    return result.power if result.status == PoseStatus.SETTLED else 0.0
+def _work(before, after, yaw, turn, duration, wheels):
+    """Return the energy [J] of the wheels that drive from a RESULT to the next, both settled.
+
+    A motor turns its wheel against the link that carries it, and the links turn, too.
+
+    Args:
+        before: RESULT.
+        after: RESULT with the motion of the step.
+        yaw: Yaw before the step [rad].
+        turn: Turn on it [rad].
+        duration: Its time [s].
+        wheels: Wheels.
+    """
+    roll, pitch = 0.5 * (before.q[1] + after.q[1]), 0.5 * (before.q[2] + after.q[2])
+    about_x = after.q[1] - before.q[1] - turn * np.sin(pitch)
+    about_y = (after.q[2] - before.q[2]) * np.cos(roll) + turn * np.sin(roll) * np.cos(pitch)
+    energy = 0.0
+    for wheel in range(6):
+        rate = after.wheel_speed[wheel]
+        if rate == 0.0:
+            continue
+        direction = -1.0 if rate < 0.0 else 1.0
+        steering = after.steering_angle[wheel]
+        heading = yaw + 0.5 * turn + steering
+        centre, last = after.wheel_centres[wheel], before.wheel_centres[wheel]
+        x, y, climb = centre[0] - last[0], centre[1] - last[1], centre[2] - last[2]
+        level = bulge(turn) * abs(np.cos(heading) * x + np.sin(heading) * y)
+        # A wheel that goes down more steeply than 45 degrees falls.
+        way = np.hypot(level, climb) if climb > -level else level
+        joints = _link_angle(after, wheel, wheels) - _link_angle(before, wheel, wheels)
+        swing = np.cos(steering) * (about_y + joints) - np.sin(steering) * about_x
+        spin = max(way / wheels.radius - direction * swing, 0.0)
+        # A wheel about which the rover turns may slip as good as wholly; servos turn none faster
+        # than told.
+        fastest = abs(rate) if wheels.on_servos else wheels.max_rate
+        most = max(spin, fastest * duration)
+        for result in (before, after):
+            slip = result.slip_ratio[wheel]
+            spun = min(spin / (1.0 - slip), most) if slip < 1.0 else most
+            energy += 0.5 * max(direction * result.torque[wheel], 0.0) * spun
+    return energy
+
+
+@exact_kernel
+def _link_angle(result, wheel, wheels):
+    """Return the angle [rad] of the link that carries a wheel to the body."""
+    rocker = result.rocker_angle[wheel // 3]
+    bogie = result.q[4 + wheel // 3] if wheel % 3 != wheels.rocker_wheel else 0.0
+    return rocker + bogie
 
 
 @exact_kernel
@@ -353,34 +414,23 @@ def _speed_share(result):
 
 
 @exact_kernel
-def find_remaining_jumps(path, between, wheels, ends):
+def find_remaining_jumps(path, order, waypoints, wheels, ends):
     """Find the neighbours on a path whose contacts jump at one place; return their number.
 
     Args:
-        path: Crossings of the waypoints.
-        between: Crossings in between, no wheel held.
+        path: Crossings of the waypoints, then those in between, no wheel held.
+        order: (n,) its rows in path order.
+        waypoints: Number of waypoints.
         wheels: Wheels.
-        ends: (>= n + m, 2) pairs of neighbours, written: waypoint i as i, pose j in between as
-            n + j.
+        ends: (>= n, 2) pairs of neighbours, written.
     """
-    n, m = path.place.size, between.place.size
-    count, last, j = 0, 0, 0
-    for k in range(1, n + m):
-        waypoint = k - j
-        if j < m and between.place[j] < waypoint:
-            here = n + j
-            j += 1
-        else:
-            here = waypoint
-        a = path.results[last] if last < n else between.results[last - n]
-        b = path.results[here] if here < n else between.results[here - n]
-        if jumps_between(a, b, wheels):
-            apart = 0.0
-            if last < n and here < n:
-                apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
-            searched = last >= n or here >= n or apart > 0.0
-            if searched and apart <= wheels.radius:
-                ends[count, 0], ends[count, 1] = last, here
-                count += 1
-        last = here
+    count = 0
+    for k in range(1, order.size):
+        last, here = order[k - 1], order[k]
+        if not jumps_between(path.results[last], path.results[here], wheels):
+            continue
+        apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
+        if max(last, here) >= waypoints or 0.0 < apart <= LONGEST_STEP * wheels.radius:
+            ends[count, 0], ends[count, 1] = last, here
+            count += 1
     return count

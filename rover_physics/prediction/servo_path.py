@@ -19,8 +19,14 @@ import numpy as np
 from rover_physics.limits.table import MIN_SPEED_SHARE, RUNAWAY
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.path_kernels import FACE, Crossings, Wheels, distances_between
-from rover_physics.prediction.slots import order_along, stop_in_slots
+from rover_physics.prediction.path_kernels import (
+    FACE,
+    LONGEST_STEP,
+    Crossings,
+    Wheels,
+    distances_between,
+)
+from rover_physics.prediction.slots import stop_in_slots
 from rover_physics.results.record import select_results
 from rover_physics.status import PoseStatus
 
@@ -39,13 +45,8 @@ def write_servo_path(
     course = _Course(model.wheels, poses, results, crossings)
     _carry_by_momentum(course, float(model.record.linkage.gravity))
     stop_in_slots(results, crossings)
-    results["drift"] = _find_drift(course, drift_window(model))
-    results["lift_height"], crossings.results["lift_height"] = _find_lift_heights(course)
-
-
-def drift_window(model: PackedModel) -> float:
-    """Return the way before a waypoint within which drift counts [m]: the rover's length."""
-    return float(model.record.linkage.length)
+    results["drift"] = _find_drift(course, model.rover.wheelbase)
+    _write_lift_heights(course)
 
 
 class _Course:
@@ -54,8 +55,7 @@ class _Course:
     def __init__(self, wheels: Wheels, poses: Floats, results: Any, crossings: Crossings):
         self.wheels, self.crossings = wheels, crossings
         self.waypoints, self.results = poses, results
-        self.order = order_along(len(poses), crossings)
-        """Rows of this order: of the waypoints, numbered from 0, and then of the others."""
+        self.order = crossings.order_among(len(poses))
         self.poses = np.concatenate([poses, crossings.poses])[self.order]
 
     @cached_property
@@ -93,7 +93,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
     nominal = speed**2 / (2.0 * gravity)
     distances = np.append(0.0, course.distances)
     stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
-    head, carried = 0.0, np.zeros(len(deficits))
+    head, carried, most = 0.0, np.zeros(len(deficits)), RUNAWAY * course.wheels.radius
     for k in np.flatnonzero(deficits).tolist():
         if k > 0 and deficits[k - 1] == 0.0:
             head = 0.0 if stands[k - 1] else share[k - 1] ** 2 * nominal[k - 1]
@@ -102,7 +102,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
         before = deficits[k - 1] if (deficits[k - 1] < 0.0) == (deficits[k] < 0.0) else 0.0
         head -= 0.5 * (before + deficits[k]) * distances[k] if distances[k] else 0.0
         head = 0.0 if stands[k] and deficits[k] > 0.0 else max(head, 0.0)
-        if MIN_SPEED_SHARE**2 * nominal[k] < head <= RUNAWAY:
+        if MIN_SPEED_SHARE**2 * nominal[k] < head <= most:
             carried[k] = head
     rolls = carried > 0.0
     share[rolls] = np.sqrt(carried[rolls] / nominal[rolls])
@@ -112,12 +112,12 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
         course.write(name, np.where(rolls, np.minimum(values, 1.0), values))
 
 
-def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
-    """Return the heights (n, 6), (m, 6) [m] to which wheels have lifted, at waypoints and between.
+def _write_lift_heights(course: _Course) -> None:
+    """Write the heights [m] to which wheels have lifted, at waypoints and between.
 
     Poses at one place, as while a wheel climbs a face, add nothing.
     """
-    rate, n = course.values("lift_rate"), len(course.waypoints)
+    rate = course.values("lift_rate")
     heights = np.zeros(rate.shape)
     if (rate > 0.0).any():
         share = course.values("speed_share")
@@ -125,16 +125,16 @@ def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
         for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * course.distances[k - 1]
             heights[k] = np.where(rate[k] > 0.0, heights[k - 1] + rise, 0.0)
-    heights[course.order] = heights.copy()
-    return heights[:n], heights[n:]
+    course.write("lift_height", heights)
 
 
 def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats:
-    """Return time [s] and energy [J] (n, 2) by which climbs exceed what `add_up` counts.
+    """Return time [s] and energy [J] (n, 2) that climbs take beside what `add_up` counts.
 
     A wheel that climbs takes its time while the body hardly moves. The distance that the rover
     goes is the mean of those of its wheel centres; a wheel that goes down more steeply than 45
-    degrees falls, which takes no time. Both are sums since the first waypoint, over the steps
+    degrees falls, which takes no time. Meanwhile the others slip: that energy is their power in
+    the time. Both are sums since the first waypoint, over the steps
     between settled waypoints that have poses between them.
 
     Args:
@@ -182,7 +182,7 @@ def _find_drift(course: _Course, window: float) -> Floats:
             turns, of its outermost wheel.
     """
     wheels, poses, crossings = course.wheels, course.waypoints, course.crossings
-    long_steps = np.append(False, distances_between(wheels, poses) > wheels.radius)
+    long_steps = np.append(False, distances_between(wheels, poses) > LONGEST_STEP * wheels.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
     course = _Course(wheels, poses, course.results, turns)
     share, deviation = course.values("speed_share"), course.values("deviation")

@@ -8,7 +8,6 @@ are not determined there: friction at both faces may lock it, whatever the motor
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.prediction.path_kernels import Crossings
 from rover_physics.status import Stall
@@ -19,19 +18,13 @@ between them is then within 20 degrees of both normals, less than the friction a
 that a rover drives on, so friction at the two faces can hold any force."""
 
 
-def order_along(waypoints: int, crossings: Crossings) -> NDArray[np.int64]:
-    """Return the order along the path of its waypoints, numbered from 0, and then the others."""
-    places = np.append(np.arange(waypoints), crossings.place)
-    return np.lexsort((np.arange(len(places)) >= waypoints, places))
-
-
 def stop_in_slots(results: Any, crossings: Crossings) -> None:
     """Set the speed share to 0 where a wheel is wedged, of RESULTs (n,) and those between."""
     parts, n = (results, crossings.results), len(results)
     angles = np.concatenate([part["contact_angle"] for part in parts])
     if not (np.fmax.reduce(angles) - np.fmin.reduce(angles) >= WEDGED).any():
         return
-    order = order_along(n, crossings)
+    order = crossings.order_among(n)
     speeds = np.concatenate([part["wheel_speed"] for part in parts])
     angles = (angles * np.sign(speeds))[order]
     # The contact jumps from the face behind to the face in front.

@@ -77,7 +77,8 @@ QUANTITIES = (
     ),
     Quantity("belly_clearance", (), "m", "smallest height of the underside above the ground"),
     Quantity(
-        "power", (), "W", "mechanical power of the wheel motors; braking motors count as 0"
+        "power", (), "W",
+        "mechanical power of the wheel motors at the nominal speed; braking motors count as 0",
     ),
     Quantity(
         "speed_share", (), "",
@@ -156,8 +157,8 @@ QUANTITIES = (
     ),
     Quantity(
         "energy", (), "J",
-        "mechanical energy spent since the first waypoint; poses that are not settled count as "
-        "0 W", of_path=True,
+        "mechanical energy of the wheels that drive since the first waypoint; steps from or to "
+        "poses that are not settled count as 0", of_path=True,
     ),
 )  # fmt: skip
 """All quantities of a pose besides its status; NaN where the rover does not settle."""

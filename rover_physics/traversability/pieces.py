@@ -187,7 +187,7 @@ class _Sweep:
         inside = readable(between.results), np.searchsorted(between.waypoint, ends)
         linkage = self._model.record.linkage
         look = self._model.limits.records, self._model.wheels, float(linkage.length)
-        sum_up_pieces(path, inside, look, float(linkage.steering_rate), sums, found)
+        sum_up_pieces(path, inside, look, sums, found)
         found[unsure, 0] = np.nan
         passes = found[:, 0] == found[:, 0]
         self._is_open[indices[passes]] = False
@@ -240,7 +240,7 @@ class _Sweep:
 
 
 @exact_kernel
-def sum_up_pieces(path, between, look, steering_rate, sums, found):
+def sum_up_pieces(path, between, look, sums, found):
     """Write time, energy and exposure of the pieces that pass without a closer look.
 
     Args:
@@ -248,7 +248,6 @@ def sum_up_pieces(path, between, look, steering_rate, sums, found):
             pieces end.
         between: Results between the waypoints, and (k,) the rows where those of the pieces end.
         look: (k,) LIMIT, Wheels and wheelbase [m].
-        steering_rate: Largest speed of the steering [rad/s].
         sums: (3, n) work space.
         found: (k, 3) time [s], energy [J] and exposure [s], written for pieces that pass.
     """
@@ -265,7 +264,7 @@ def sum_up_pieces(path, between, look, steering_rate, sums, found):
         ):
             continue
         start = (0.0, 0.0, 0.0)
-        last = add_up(poses[piece], results[piece], steering_rate, start, sums[:, piece])
+        last = add_up(poses[piece], results[piece], wheels, start, sums[:, piece])
         found[k, 0], found[k, 1] = last[1], last[2]
         found[k, 2] = add_exposure(numbers[piece], sums[1, piece], limits)
 

@@ -25,6 +25,9 @@ MOST_REMEDIES = 5
 ENDS_APART = 0.5
 """Distance of two poses [wheelbases] from which they are start and goal, and no path."""
 
+SAME_WAY = 0.3
+"""Way [wheel radii] at nominal speed in whose times remedies are compared."""
+
 
 @dataclass(frozen=True, eq=False)
 class Advice:
@@ -132,9 +135,10 @@ def path_of(rover: Rover, poses: Floats, spacing: float) -> Floats:
 
 def _rank(remedy: Remedy) -> tuple[Any, ...]:
     """Return what sorts remedies: by whom, how many levers, time, and how close to a limit."""
+    rover = remedy.judged.case.rover
     return (
         remedy.needs_others,
         len(remedy.levers),
-        round(remedy.extra_time),
+        round(remedy.extra_time * rover.nominal_speed / (SAME_WAY * rover.wheel.radius)),
         remedy.judged.largest_use[0],
     )

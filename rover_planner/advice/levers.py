@@ -186,7 +186,7 @@ def _around(refusal: JudgedCase) -> Choice | None:
     return Choice(float(refusal.distance[-1]), (length,))
 
 
-def _describe_way(refusal: JudgedCase, length: float, now: float) -> str:
+def _describe_path_around(refusal: JudgedCase, length: float, now: float) -> str:
     """Return where a path around is farthest from the refused one, and its length."""
     old, new = refusal.case.poses, refusal.path_around
     assert new is not None
@@ -352,7 +352,7 @@ LEVERS: tuple[Lever, ...] = (
     ),
     Lever(
         "path_around", "m", _around,
-        _with_path(lambda _case, refusal, _length: refusal.path_around), _describe_way,
+        _with_path(lambda _case, refusal, _length: refusal.path_around), _describe_path_around,
         changes_path=True, keeps_rows=False,
     ),
     Lever(

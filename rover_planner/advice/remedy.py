@@ -64,7 +64,7 @@ class Remedy:
         return float(self.judged.distance[-1] - self.refusal.distance[-1])
 
     def describe_costs(self) -> str:
-        """Return time, way, energy and chance in words."""
+        """Return time, distance, energy and chance in words."""
         distance = f"{self.extra_distance:+.1f} m, " if abs(self.extra_distance) > 0.05 else ""
         return (
             f"{round(self.extra_time):+d} s, {distance}{round(self.extra_energy):+d} J, "

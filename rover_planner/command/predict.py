@@ -160,7 +160,9 @@ def predict(
             )
     typer.echo(f"wrote {out}: {_summarise(len(path), verdict)}")
     if curvature is None:
-        _warn_of_long_steps(path, model.wheel.radius)
+        from rover_physics.prediction.path_kernels import LONGEST_STEP
+
+        _warn_of_long_steps(path, LONGEST_STEP * model.wheel.radius)
 
 
 def _warn_of_long_steps(path: "NDArray[np.float64]", longest: float) -> None:
@@ -170,7 +172,7 @@ def _warn_of_long_steps(path: "NDArray[np.float64]", longest: float) -> None:
     if step > longest:
         k = steps.index(step)
         typer.echo(
-            f"warning: from waypoint {k} to {k + 1} it is {step:.2f} m; what lies between "
+            f"warning: from waypoint {k} to {k + 1} it is {step:g} m; what lies between "
             f"waypoints is looked at if they are at most a wheel radius apart, {longest:g} m",
             err=True,
         )

@@ -5,6 +5,7 @@ import contextlib
 import ctypes
 import gc
 import math
+import signal
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -62,7 +63,7 @@ def view(
 ) -> None:
     """Show the rover on a terrain in a web page: watch it drive, see why it can or cannot.
 
-    Exit code 0: it was interrupted. 2: bad input.
+    Exit code 0: Ctrl-C ended the page. 2: bad input. 130: Ctrl-C came before there was a page.
     """
     if follow and prediction is not None:
         raise PlanningError("--follow and --prediction exclude each other: live or recorded")
@@ -72,6 +73,7 @@ def view(
         raise PlanningError("--prediction needs TERRAIN, the map that the prediction is about")
     _return_freed_blocks()
     need("viser", "the page")
+    _import_viser()
     if follow:
         need("rclpy", "--follow")
     if survey is not None:
@@ -117,6 +119,15 @@ def view(
         with contextlib.suppress(KeyboardInterrupt):
             page.wait()
     typer.echo("ended")
+
+
+def _import_viser() -> None:
+    """Import viser; Ctrl-C waits meanwhile, as libraries that it imports catch and forget it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        import viser  # noqa: F401
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _return_freed_blocks() -> None:

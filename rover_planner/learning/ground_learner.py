@@ -60,7 +60,7 @@ and slips by turns; its mean shear is then below the friction."""
 MAX_UNSTEADY = 0.1
 """Acceleration of the treads, over gravity, from which a window does not count."""
 SAME_PLACE = 0.5
-"""Way of a wheel, over its radius, within which its measurements are not independent."""
+"""Distance of a wheel, over its radius, within which its measurements are not independent."""
 AT_A_PLACE = 1.0
 """Number of independent measurements that a wheel makes at one place."""
 SAME_TIME = 0.2
@@ -82,7 +82,7 @@ FASTEST = 0.8
 RESISTANCE_TIME = 10.0
 """Time constant of the mean resistance [s]."""
 MARK_TIME = 1.0
-"""Time after which a place is marked on the map again [s]; a way of half a wheel is sooner."""
+"""Time after which a place is marked on the map again [s]; half a wheel farther on is sooner."""
 JUMP = 0.05
 """Step of the position beyond what the wheels can drive that is no motion [m]."""
 CHANGE_CERTAIN = 2.0
@@ -206,7 +206,7 @@ class GroundLearner:
         if not math.isfinite(time):
             return False
         elapsed, self._time, new = time - last, time, False
-        if not elapsed <= LONGEST_GAP or self._jumps(row):
+        if not 0.0 <= elapsed <= LONGEST_GAP or self._jumps(row):
             self._begin()
             elapsed = 0.0
         else:
@@ -254,15 +254,17 @@ class GroundLearner:
         window = self._windows.take(float(row[TIME]), block["turned"] / count, state)
         if window is None:
             return False
-        elapsed = window.time - self.window.time if self.window else self._block_duration
-        self.window = window
+        last, self.window = self.window, window
+        elapsed = self._block_duration
+        if last is not None and window.time > last.time:  # else the clock was set back
+            elapsed = window.time - last.time
         classes = self.ground.classes_at(window.places)
         for number in set(classes[np.isfinite(classes)].astype(int).tolist()):
             self._classes.setdefault(number, FrictionFilter(self._told))
         on_class = {number: classes == number for number in self._classes}
         self._learn(window, measured, on_class, min(elapsed, window.duration))
-        way = float(np.abs(window.places - self._marked).max())
-        if way > 0.5 * self._rover.wheel.width or window.time > self._mark_time + MARK_TIME:
+        moved = float(np.abs(window.places - self._marked).max())
+        if moved > 0.5 * self._rover.wheel.width or abs(window.time - self._mark_time) > MARK_TIME:
             self._marked, self._mark_time = window.places, window.time
             for one, wheels in zip(self._sides.values(), _SIDE_WHEELS, strict=True):
                 self.ground.visit(window.places[wheels & np.isnan(classes)], one.estimate)

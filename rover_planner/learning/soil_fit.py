@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """An estimate of the parameters of soft ground, from thrust, slip and resistance of the wheels.
 
-Pieces of way of a wheel radius measure how much all wheels pull beyond what moves the rover, which
-is their resistance, and the thrust of each wheel at its slip. Four parameters of the soil model
-(docs/soil.md) are fitted to the last pieces, with what is told as the prior.
+Pieces of path of a wheel radius measure how much all wheels pull beyond what moves the rover,
+which is their resistance, and the thrust of each wheel at its slip. Four parameters of the soil
+model (docs/soil.md) are fitted to the last pieces, with what is told as the prior.
 """
 
 from collections import deque
@@ -79,7 +79,7 @@ class SoilEstimate:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """Means over a piece of way."""
+    """Means over a piece of the path."""
 
     loads: Floats
     slips: Floats
@@ -117,33 +117,34 @@ class SoilFit:
         self._begin()
 
     def _begin(self) -> None:
-        self._way = self._time = 0.0
+        self._distance = self._time = 0.0
         self._sums = np.zeros((7, WHEEL_COUNT))
 
     def take(self, window: SlipWindow, good: NDArray[np.bool_], elapsed: float) -> None:
         """Take a window of a steady drive, in which wheels (6,) can be believed or not."""
-        rolling, way = window.rolling, float(np.sign(np.median(window.rolling)))
+        rolling, forward = window.rolling, float(np.sign(np.median(window.rolling)))
         usable = good & (window.clear > 0.0) & (window.loads > 0.1 * self._load)
-        if not usable.all() or (way * rolling < 5.0 * (window.deviation + window.scrub)).any():
+        if not usable.all() or (forward * rolling < 5.0 * (window.deviation + window.scrub)).any():
             self._begin()
             return
         unsteady = window.unsteadiness / window.duration / self._gravity
         values = [
-            way * rolling, way * window.slip, window.aside, window.loads, way * window.tractions,
+            forward * rolling, forward * window.slip, window.aside,
+            window.loads, forward * window.tractions,
             np.full(WHEEL_COUNT, window.deviation * window.duration),
-            np.full(WHEEL_COUNT, way * window.excess / (WHEEL_COUNT * self._load) - unsteady),
+            np.full(WHEEL_COUNT, forward * window.excess / (WHEEL_COUNT * self._load) - unsteady),
         ]  # fmt: skip
         self._sums += elapsed * np.array(values)
         self._time += elapsed
-        self._way += elapsed * float(np.abs(rolling).mean())
-        if self._way >= self._radius:
+        self._distance += elapsed * float(np.abs(rolling).mean())
+        if self._distance >= self._radius:
             self._pieces.append(self._end_piece())
             self._estimate = None
             self._begin()
 
     def _end_piece(self) -> _Piece:
         rolling, slip, aside, loads, thrusts, jitter, share = self._sums / self._time
-        noise = float(jitter[0]) / self._time  # of the way between two ends, over the time
+        noise = float(jitter[0]) / self._time  # of the distance between two ends, over the time
         aside = np.sqrt(np.maximum(aside**2 - noise**2, 0.0))
         whole = np.maximum(np.hypot(slip, aside), 1e-9)
         ahead = np.where(slip > 0.5 * whole, slip / whole, np.nan)

@@ -63,7 +63,7 @@ class StuckWatch:
             wanted = abs(commanded) > self._slowest
         wanted = wanted and window.scrub.max() < self._slowest  # else it stands while it steers
         past = self._past
-        if past and window.time - past[-1][0] > LONGEST_GAP:
+        if past and not 0.0 <= window.time - past[-1][0] <= LONGEST_GAP:
             past.clear()
         past.append((window.time, window.places, np.sign(window.rolling) * free, wanted))
         while len(past) > 1 and window.time - past[1][0] >= PATIENCE - 1e-6:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odometry from wheels and an IMU that knows how wheels slip, with a covariance; without ROS.
 
-Wheels under load creep: forward by a share of their way that grows with what they push, and down a
-side slope. How much is learned wherever the motion is measured without the wheels, piece by piece
-of way, and taken off where it is not. The misses that are left are the noise of the odometry.
+Wheels under load creep: forward by a share of their distance that grows with what they push, and
+down a side slope. How much is learned wherever the motion is measured without the wheels, piece by
+piece of the path, and taken off where it is not. The misses that are left are the noise of the
+odometry.
 
 Wheels that need all friction slide: a rover that pushes against an obstacle stands, and its wheels
 turn on. Their torques tell how much they push, and the ground's friction how much they can.
@@ -22,18 +23,18 @@ from rover_planner.learning.wheel_slip import LONGEST_GAP
 from rover_planner.planning.angles import wrap
 
 FORWARD_PRIOR, SIDE_PRIOR = (0.03, 0.2), (0.2,)
-"""Standard deviations before anything was learned: of the share of way that is lost everywhere,
-of that per push, and of the way aside per side slope."""
+"""Standard deviations before anything was learned: of the share of the distance that is lost
+everywhere, of that per push, and of the distance aside per side slope."""
 MISS, MISS_COUNT = 0.03, 4.0
-"""Standard deviation of the miss of a piece over its way, and for how many pieces it counts."""
+"""Standard deviation of the miss of a piece over its length, and for how many pieces it counts."""
 GYRO_NOISE, GYRO_BIAS = 2e-3, 1e-4
 """Noise of the yaw rate [rad/sqrt(s)], and its unknown bias [rad/s]."""
 HALF_SLIDE, SLIDE_SPREAD = 0.85, 0.1
-"""Use of friction at which wheels that slide lose half of the way, and the standard deviation of
-its logarithm."""
+"""Use of friction at which wheels that slide lose half of the distance, and the standard deviation
+of its logarithm."""
 SIDE_SLIDE = 0.25
-"""Way aside over the way that wheels roll while they slide, on any ground: a face that the rover
-meets askew pushes it aside."""
+"""Distance aside over the distance that wheels roll while they slide, on any ground: a face that
+the rover meets askew pushes it aside."""
 TRACTION_TIME = 0.5
 """Time over which the traction is averaged [s]: it jumps where wheels hop."""
 
@@ -93,9 +94,9 @@ class WheelOdometry:
         self.time, self.yaw_rate = math.nan, math.nan
         """Time [s] and yaw rate [rad/s] of the last row; NaN before the first."""
         self._sums, self._slides = np.zeros(13), np.zeros((2, 2))
-        self._forward_ways, self._noise = self._sums[:8].reshape(2, 2, 2)
-        self._side_way, self._piece_ways = self._sums[8:10], self._sums[10:]
-        self._way = self._elapsed = 0.0
+        self._forward_distances, self._noise = self._sums[:8].reshape(2, 2, 2)
+        self._side_distance, self._piece_distances = self._sums[8:10], self._sums[10:]
+        self._distance = self._elapsed = 0.0
         self._begin: Floats | None = None
 
     def take(self, row: Floats, yaw_rate: float) -> None:
@@ -139,23 +140,23 @@ class WheelOdometry:
         ahead_noise = piece * (along * c**2 + across * s**2)
         aside_noise = piece * (along * s**2 + across * c**2)
         self._sums += step * np.array([
-            c, c * push, s, s * push,  # forward ways
+            c, c * push, s, s * push,  # forward distances
             ahead_noise, mixed, mixed, aside_noise,
-            -s * aside, c * aside,  # way aside
-            1.0, push, aside,  # ways of the piece
+            -s * aside, c * aside,  # distance aside
+            1.0, push, aside,  # distances of the piece
         ])  # fmt: skip
         self._slides += (
             raw * elapsed * np.array([[slide * c, slide * s], [-slide_aside * s, slide_aside * c]])
         )
         self._elapsed += elapsed
-        self._way += abs(step)
+        self._distance += abs(step)
 
     def _find_slide(self, push: float, aside: float) -> tuple[float, float, float]:
-        """Return the share of the way that sliding wheels lose, with its standard deviation.
+        """Return the share of the distance that sliding wheels lose, and its standard deviation.
 
         The share is that at the known friction, whose error is in the deviation. The third number
         is the standard deviation of the share that they go aside, where the ground falls: what
-        has no friction left slides that way.
+        has no friction left slides there.
 
         Args:
             push: What all wheels pull in the direction of the motion, over the weight.
@@ -182,21 +183,21 @@ class WheelOdometry:
 
     def learn(self, pose: Floats) -> None:
         """Take a pose (3,) that was not measured by the wheels: x, y [m], yaw [rad]."""
-        if self._begin is None or self._way > self._piece:
+        if self._begin is None or self._distance > self._piece:
             if self._begin is not None and np.isfinite(pose).all():
                 self._learn_piece(self._begin, pose)
-            self._begin, self._way = np.array(pose), 0.0
-            self._piece_ways[:] = 0.0
+            self._begin, self._distance = np.array(pose), 0.0
+            self._piece_distances[:] = 0.0
 
     def _learn_piece(self, begin: Floats, end: Floats) -> None:
-        """Learn from a piece of way between two measured poses."""
+        """Learn from a piece of the path between two measured poses."""
         step, yaw = end[:2] - begin[:2], begin[2] + 0.5 * float(wrap(end[2] - begin[2]))
         ahead = float(step @ [np.cos(yaw), np.sin(yaw)])
         left = float(step @ [-np.sin(yaw), np.cos(yaw)])
-        ways = self._piece_ways / self._way
-        if abs(ways[0]) > 0.9:  # it did not go back and forth
-            self.forward.add(ways[:2], ways[0] - ahead / self._way)
-            self.side.add(ways[2:], -left / self._way)
+        distances = self._piece_distances / self._distance
+        if abs(distances[0]) > 0.9:  # it did not go back and forth
+            self.forward.add(distances[:2], distances[0] - ahead / self._distance)
+            self.side.add(distances[2:], -left / self._distance)
 
     @property
     def covariance(self) -> Floats:
@@ -206,8 +207,8 @@ class WheelOdometry:
         result = np.zeros((3, 3))
         result[:2, :2] = (
             self._noise
-            + self._forward_ways @ self.forward.covariance @ self._forward_ways.T
-            + self.side.covariance[0, 0] * np.outer(self._side_way, self._side_way)
+            + self._forward_distances @ self.forward.covariance @ self._forward_distances.T
+            + self.side.covariance[0, 0] * np.outer(self._side_distance, self._side_distance)
             + self._slides.T @ self._slides
             + yaw / 3.0 * np.outer(across, across)
         )

@@ -21,9 +21,9 @@ from rover_planner.learning.contact_sense import WHEEL_STATE
 
 BLOCK = 0.1
 """Longest duration of a block [s]."""
-BLOCK_WAY = 0.08
-"""Longest way of a block at the rover's nominal speed [wheel radii]: the ground below a wheel must
-hardly change in a window."""
+BLOCK_LENGTH = 0.08
+"""Longest distance of a block at the rover's nominal speed [wheel radii]: the ground below a wheel
+must hardly change in a window."""
 WINDOW = 6
 """Number of blocks of a window."""
 MAX_TURN = 0.15
@@ -157,7 +157,7 @@ class SlipWindows:
 
 @kernel
 def _fit_window(blocks, radius, half_width, fits):
-    """Fit straight lines to the ways of treads and wheel centres over the blocks of a window."""
+    """Fit straight lines to distances of treads and wheel centres over the blocks of a window."""
     fit = fits[0]
     middle = 0.0
     for k in range(WINDOW):
@@ -177,7 +177,7 @@ def _fit_window(blocks, radius, half_width, fits):
 
 @kernel
 def _roll(block, radius):
-    """Return the mean way of all treads to a block [m]."""
+    """Return the mean distance of all treads to a block [m]."""
     total = 0.0
     for wheel in range(WHEEL_COUNT):
         total += radius * (block.turned[wheel] + block.state.links[wheel])
@@ -200,18 +200,18 @@ def _fit_motion(wheel, blocks, middle, radius, fit):
     rolling = speed_x = speed_y = 0.0
     for k in range(WINDOW):
         state, weight = blocks[k].state, (blocks[k].time - middle) / fit.spread
-        way = radius * (blocks[k].turned[wheel] + state.links[wheel])
-        rolling += weight * (way - rolled)
+        distance = radius * (blocks[k].turned[wheel] + state.links[wheel])
+        rolling += weight * (distance - rolled)
         speed_x += weight * (state.centres[wheel, 0] - x)
         speed_y += weight * (state.centres[wheel, 1] - y)
     squares = 0.0
     for k in range(WINDOW):
         state, since = blocks[k].state, blocks[k].time - middle
-        way = radius * (blocks[k].turned[wheel] + state.links[wheel])
+        distance = radius * (blocks[k].turned[wheel] + state.links[wheel])
         rest_x = state.centres[wheel, 0] - x - since * speed_x
         rest_y = state.centres[wheel, 1] - y - since * speed_y
         # A curved course also leaves a rest; it is the same in all wheels and small.
-        rest = way - rolled - since * rolling - rest_x * along_x - rest_y * along_y
+        rest = distance - rolled - since * rolling - rest_x * along_x - rest_y * along_y
         squares += rest * rest / (WINDOW - 2)
     across = along_x * axle_y - along_y * axle_x
     fit.squares[wheel], fit.rolling[wheel] = squares, rolling
@@ -243,7 +243,7 @@ def _average(wheel, blocks, half_width, fit):
 
 def find_block_duration(rover: Rover) -> float:
     """Return the duration of a block [s]."""
-    return min(BLOCK, BLOCK_WAY * rover.wheel.radius / rover.nominal_speed)
+    return min(BLOCK, BLOCK_LENGTH * rover.wheel.radius / rover.nominal_speed)
 
 
 def find_median(values: Floats) -> Floats:

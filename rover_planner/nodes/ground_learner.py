@@ -4,6 +4,7 @@
 import json
 import math
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -36,7 +37,14 @@ from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import latched_qos, newest_qos, polled_qos, sensor_qos
+from rover_planner.ros.qos import (
+    joints_qos,
+    latched_qos,
+    newest_qos,
+    polled_qos,
+    result_qos,
+    sensor_qos,
+)
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.shell.kernels import load_kernels
@@ -77,13 +85,14 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._commanded, self._command_time, self._sent, self._stuck = 0.0, -1e9, -1e9, ""
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
-        self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
+        self._marks = self.create_publisher(String, MARK_PLACE, result_qos())
         self._wheels = WheelOdometry(self._rover)
         self._wheels_told = -math.inf  # time of the last odometry of the wheels that was sent
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         hear, rows = self.heard.subscribe, self._rows
         hear(TwistStamped, "cmd_vel", self._take_command, newest_qos())
-        hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), polled_qos())
+        joints = joints_qos(POLLING)
+        hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), joints)
         hear(Imu, "imu", self._take_imu, polled_qos())
         hear(Odometry, "odometry", self._take_odometry, polled_qos())
         self.loop = self.create_timer(POLLING, self._read_sensors)
@@ -105,17 +114,17 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         except RoverError as error:
             self.get_logger().warning(f"{CLOUD} not used: {error}", throttle_duration_sec=5.0)
 
-    def _take_command(self, twist: Any, _arrival: float) -> None:
-        self._commanded, self._command_time = twist_to_speeds(twist)[0], self.seconds
+    def _take_command(self, twist: Any, arrival: float) -> None:
+        self._commanded, self._command_time = twist_to_speeds(twist)[0], arrival
 
     def _read_sensors(self) -> None:
         """Take what the sensors sent, and tell where the wheels say that the rover is."""
         learner, wheels = self.learner, self._wheels
         if learner is not None:
-            is_fresh = self.seconds - self._command_time < COMMAND_AGE
+            is_fresh = time.monotonic() - self._command_time < COMMAND_AGE
             learner.commanded = self._commanded if is_fresh else None
         self.heard.poll()
-        if not wheels.time > self._wheels_told:
+        if not abs(wheels.time - self._wheels_told) > 0.0:
             return
         self._wheels_told = wheels.time
         message = planar_odometry(
@@ -160,7 +169,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
                 rolling = 0.0 if learner.window is None else learner.window.rolling.mean()
                 place = find_place_ahead(self._rover, row, rolling, stuck)
                 self._marks.publish(String(data=json.dumps(asdict(place))))
-        if now - self._sent >= PERIOD or bool(stuck) != bool(before):
+        if not 0.0 <= now - self._sent < PERIOD or bool(stuck) != bool(before):
             self._sent = now
             friction = learner.estimate.friction
             self._wheels.friction, self._wheels.friction_deviation = friction.mean, friction.std

@@ -104,7 +104,7 @@ class ResultMessages:
     judgement: PathJudgement
     """The judgement."""
     identity: IdentityReport
-    """What it is about."""
+    """Question, map and path that it is about."""
     header: Header
     """Frame of the map, and stamp, of all messages."""
     rover: Rover

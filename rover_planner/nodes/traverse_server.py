@@ -57,7 +57,13 @@ from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.qos import newest_qos, polled_qos, replace_reliability, topic_qos
+from rover_planner.ros.qos import (
+    joints_qos,
+    newest_qos,
+    replace_reliability,
+    result_qos,
+    topic_qos,
+)
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
@@ -127,7 +133,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _create_subscriptions(self) -> None:
         hear, inputs = self.heard.subscribe, self._inputs
-        hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), polled_qos())
+        joints = joints_qos(IDLE_PERIOD)
+        hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), joints)
         hear(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
             hear(Imu, "imu", lambda one, _: inputs.take_imu(one), newest_qos())
@@ -135,7 +142,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
         hear(String, "~/ground_estimate", self._take_ground, qos)
-        self.create_subscription(String, "~/mark_place", self._take_mark, qos)
+        # Only a transient-local one hears of places that were marked before a restart.
+        for profile in (qos, result_qos()):
+            self.create_subscription(String, "~/mark_place", self._take_mark, profile)
 
     def _log_ready(self) -> None:
         name, known = self.service.settings.rover.name, self.service.known_map
@@ -193,8 +202,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         except RoverError as error:
             self.get_logger().warning(f"not used: {error}")
             return
-        self.service.mark(place)
-        self.get_logger().warning(place.describe())
+        if self.service.mark(place):
+            self.get_logger().warning(place.describe())
 
     def _clear_marks(
         self, _request: Trigger.Request, response: Trigger.Response

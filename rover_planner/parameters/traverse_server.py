@@ -9,8 +9,8 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 
-MIN_PLAN_SPACING = 0.001
-"""Smallest plan_spacing other than 0 [m]."""
+LEAST_SPACINGS = {"candidate_spacing": 0.01, "waypoint_spacing": 0.001, "plan_spacing": 0.001}
+"""Smallest values other than 0 of the distances along and between paths [m]."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
 """Values of the parameter unknown_cells."""
 ALLOW, ALLOW_FOOTPRINT = "allow", "allow_footprint"
@@ -64,10 +64,13 @@ class TraverseServerParameters(ParameterTable):
     )
     candidate_count: int = parameter(9, "Largest number of candidate paths.", bounds=(1, 99))
     candidate_spacing: float = parameter(
-        0.3, "Distance between candidates half-way.", "m", (0.01, 10.0)
+        0.0, "Distance between candidates half-way; 0 is three wheel radii.", "m", (0.0, 10.0)
     )
     waypoint_spacing: float = parameter(
-        0.02, "Largest distance between judged waypoints.", "m", (0.001, 1.0)
+        0.0,
+        "Largest distance between judged waypoints; 0 is a fifth of the wheel radius.",
+        "m",
+        (0.0, 1.0),
     )
     planner: str = parameter(
         AUTO,
@@ -232,7 +235,10 @@ class TraverseServerParameters(ParameterTable):
         "Whether the accepted path is watched; ~/stop is then true unless the rover may drive it.",
     )
     monitor_offset: float = parameter(
-        0.5, "Distance from its path above which the rover is to stop.", "m", (0.01, 100.0)
+        0.0,
+        "Distance from its path above which the rover is to stop; 0 is five wheel radii.",
+        "m",
+        (0.0, 100.0),
     )
     monitor_timeout: float = parameter(
         1.0,
@@ -262,11 +268,12 @@ class TraverseServerParameters(ParameterTable):
         """Check all values.
 
         Raises:
-            ParameterError: As for all tables, or plan_spacing is too small.
+            ParameterError: As for all tables, or one of LEAST_SPACINGS is not kept.
         """
         super().__post_init__()
-        if 0.0 < self.plan_spacing < MIN_PLAN_SPACING:
-            raise ParameterError(
-                f"parameter plan_spacing is {self.plan_spacing}; it must be 0, or at least "
-                f"{MIN_PLAN_SPACING:g} m"
-            )
+        for name, least in LEAST_SPACINGS.items():
+            spacing = getattr(self, name)
+            if 0.0 < spacing < least:
+                raise ParameterError(
+                    f"parameter {name} is {spacing}; it must be 0, or at least {least:g} m"
+                )

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import MAX_WAYPOINTS
 
-_RING_STEP = 0.1
-"""Largest distance between rings [m], if MAX_RINGS allows it."""
 _MAX_RINGS = 4
 """Largest number of rings: each goal costs an evaluation."""
 _RING_GOALS = 8
@@ -75,15 +73,16 @@ def _count_pieces(steps: NDArray[np.float64], spacing: float) -> NDArray[np.intp
 
 
 def rings_within(
-    start: NDArray[np.float64], goal: NDArray[np.float64], tolerance: float
+    start: NDArray[np.float64], goal: NDArray[np.float64], tolerance: float, apart: float
 ) -> Iterator[list[NDArray[np.float64]]]:
     """Yield rings of goals (3,) around a goal, from near to far within `tolerance` [m].
 
-    On each ring the goals on the start's side come first.
+    They are at most `apart` [m] from each other, if _MAX_RINGS allows it. On each ring the goals
+    on the start's side come first.
     """
     if tolerance <= 0.0:
         return
-    rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / _RING_STEP)))
+    rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / apart)))
     towards_start = math.atan2(start[1] - goal[1], start[0] - goal[0])
     turns = sorted(
         (2.0 * math.pi * k / _RING_GOALS for k in range(_RING_GOALS)),

@@ -25,6 +25,18 @@ Pose = NDArray[np.float64]
 """(3,) x, y [m] and yaw [rad] of the body origin, map frame."""
 RISK_STEP = 0.05
 """Rounding step of risks [share of a limit]: paths of equal rounded risk differ by energy."""
+WAYPOINTS = 5.0
+"""Usual number of waypoints on the way of a wheel radius."""
+CANDIDATE_SPACING = 15.0
+"""Usual distance between candidates half-way [usual distances of waypoints]: three wheel radii."""
+
+
+def waypoint_spacing_for(rover: Rover) -> float:
+    """Return the usual distance between waypoints of a rover [m].
+
+    What lies between waypoints is looked at up to a wheel radius apart.
+    """
+    return rover.wheel.radius / WAYPOINTS
 
 
 @dataclass(frozen=True)
@@ -33,16 +45,25 @@ class PathQueryOptions:
 
     count: int = 9
     """Largest number of candidate paths."""
-    spacing: float = 0.3
-    """Lateral distance between neighbouring candidates half-way [m]."""
-    waypoint_spacing: float = 0.02
-    """Largest distance between waypoints along a path [m]."""
+    spacing: float = 0.0
+    """Lateral distance between neighbouring candidates half-way [m]; 0: three wheel radii."""
+    waypoint_spacing: float = 0.0
+    """Largest distance between waypoints along a path [m]; 0: a fifth of the wheel radius."""
     model: SweepOptions = DEFAULT_OPTIONS
     """Torque policy, friction, torque, soil, payload and arm of the model."""
     map_sigmas: float = SIGMAS
     """Standard deviations to allow for on an uncertain map; 0 treats heights as exact."""
     accepted_chance: float = ACCEPTED_CHANCE
     """Largest chance of failure of a path that is traversable; 1 does not ask for it."""
+
+    def fit(self, rover: Rover) -> "PathQueryOptions":
+        """Return the options with the lengths of a rover where none are told."""
+        usual = waypoint_spacing_for(rover)
+        return replace(
+            self,
+            spacing=self.spacing or CANDIDATE_SPACING * usual,
+            waypoint_spacing=self.waypoint_spacing or usual,
+        )
 
     def change(self, **changes: Any) -> "PathQueryOptions":
         """Return the options with other values of their fields, or of those of the model.
@@ -221,6 +242,7 @@ def generate_paths(
     Raises:
         PlanningError: Start, goal or options are invalid.
     """
+    options = options.fit(rover)
     return generate_candidates(
         start,
         goal,

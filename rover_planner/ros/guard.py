@@ -116,7 +116,7 @@ class GuardedExecutor(SingleThreadedExecutor):
         """Return whether a timer is a loop; with a simulated clock, /clock comes before loops."""
         if timer is None or timer is not self._loop or timer.is_canceled():
             return False
-        return not self._clock.ros_time_is_active
+        return not self._ros_clock.ros_time_is_active
 
     def _call_loop(self) -> None:
         now = time.monotonic()
@@ -155,7 +155,7 @@ class GuardedExecutor(SingleThreadedExecutor):
     def add_node(self, node: Node) -> bool:
         """Add the node; errors of its callbacks go to its guard, if it has one."""
         self._guard_of_node = getattr(node, "guard", None)
-        self._loop, self._clock = getattr(node, "loop", None), node.get_clock()
+        self._loop, self._ros_clock = getattr(node, "loop", None), node.get_clock()
         return bool(super().add_node(node))
 
     def _make_handler(self, entity, node, take_from_wait_list):

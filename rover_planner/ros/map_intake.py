@@ -54,7 +54,7 @@ class MapIntake(ABC):
         self._offers: dict[type, int] = {}
         self._pool = ThreadPoolExecutor(1, "maps")
         self.last_job: Future[None] = self.do(self.expect_other)
-        """What was given to the thread last; it is done after all that was given before."""
+        """Last job given to the thread; it is done after all that were given before."""
 
     @abstractmethod
     def prepare(self, message: Any, source: Rigid | None) -> None:

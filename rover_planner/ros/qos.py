@@ -49,6 +49,14 @@ def polled_qos() -> QoSProfile:
     return QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
+def joints_qos(period: float) -> QoSProfile:
+    """Return the profile of joint states, up to 1000 Hz in all, that are read each period [s].
+
+    Several publishers share the topic: a fast one may not push out what a slow one has sent.
+    """
+    return QoSProfile(depth=round(1000.0 * period), reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
 def newest_qos() -> QoSProfile:
     """Return the profile of sensor data of which only the last message matters."""
     return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

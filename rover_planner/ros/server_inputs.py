@@ -67,6 +67,7 @@ class ServerInputs:
         self._mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
         self._clock, self._looked = clock, -float("inf")
         self._filled: tuple[Standing, Terrain | None] | None = None
+        self._odometry_stamp: int | None = None
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self.keep(self.keeper.load(terrain, self.seconds, None), parameters.terrain_file)
@@ -87,13 +88,15 @@ class ServerInputs:
         self.service.take_joints(self.joint_names.positions(state, heard))
 
     def take_odometry(self, odometry: Any) -> None:
-        """Take the pose of the robot, as `SensorReader` reads it.
+        """Take the pose of the robot, as `SensorReader` reads it, if it was measured anew.
 
         Raises:
             RoverError: A value is wrong, or the frame is not known.
         """
-        pose, _ = self.frames.take_odometry(odometry)
-        self.service.take_pose(pose)
+        last, self._odometry_stamp = self._odometry_stamp, stamp_to_ns(odometry.header.stamp)
+        if last is None or last != self._odometry_stamp:
+            pose, _ = self.frames.take_odometry(odometry)
+            self.service.take_pose(pose)
 
     def find_here(self, max_age: float = MAX_AGE) -> Floats | None:
         """Return the pose (3,) of the body by /tf, else by odometry that is not older [s].

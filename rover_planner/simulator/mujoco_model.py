@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The MuJoCo model of a rover on a terrain, as MJCF text."""
 
+import math
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -16,13 +17,20 @@ MOTOR_INERTIA = 1.0
 STEERING_FREQUENCY = 60.0
 """Natural frequency of a steering actuator with the inertia of a wheel's motor [rad/s]."""
 
+GIVE = 0.005
+"""Depth over which a contact becomes hard [wheel radii]."""
+PIVOT_DAMPING = 0.01216
+"""Damping of a pivot, over weight x wheel radius x sqrt(wheel radius / gravity)."""
+LEAST_MASS = 1e-4
+"""Least mass of a part, over that of the rover: MuJoCo refuses parts without mass."""
+
 _MODEL = """
 <mujoco model={name}>
   <option timestep="{timestep}" gravity="0 0 -{gravity}" integrator="implicitfast" cone="elliptic"
     impratio="20" iterations="50" tolerance="1e-10"/>
   <default>
     <geom friction="{friction} 0 0" condim="3" solref="{contact_time} 1"
-      solimp="0.97 0.995 0.0005"/>
+      solimp="0.97 0.995 {give}"/>
   </default>
   <asset>
     <hfield name="ground" nrow="{rows}" ncol="{columns}" size="{half_x} {half_y} {height} 0.5"/>
@@ -62,10 +70,11 @@ def write_model(rover: Rover, terrain: Terrain, friction: float, timestep: float
     ]
     return _MODEL.format(
         name=quoteattr(rover.name), timestep=timestep,
-        contact_time=2.5 * timestep, gravity=rover.gravity, friction=friction,
+        contact_time=2.5 * timestep, give=GIVE * rover.wheel.radius,
+        gravity=rover.gravity, friction=friction,
         rows=rows, columns=columns, half_x=half[0], half_y=half[1],
         height=span if span > 0.0 else 1.0, middle_x=middle[0], middle_y=middle[1],
-        lowest=float(terrain.elevation.min()), body=_write_inertia(rover.masses.body, 1.0),
+        lowest=float(terrain.elevation.min()), body=_write_inertia(rover, rover.masses.body, 1.0),
         sides="\n".join(_write_side(rover, side) for side in SIDES), motors="\n".join(motors),
     )  # fmt: skip
 
@@ -92,18 +101,19 @@ def _write_side(rover: Rover, side: str) -> str:
         for name, place in suspension.wheels.items()
     }
     rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
+    damping = _pivot_damping(rover)
     hung = "\n".join(wheels[name] for name in suspension.bogie_wheels)
     # Positions are given in the body frame on flat ground, so each MJCF body has no offset.
     return f"""
       <body name="rocker_{side}">
         <joint name="rocker_{side}" type="hinge" axis="0 1 0" pos={_point(rocker, mirror)}
-          damping="0.01"/>
-        {_write_inertia(rover.masses.rocker, mirror)}
+          damping="{damping}"/>
+        {_write_inertia(rover, rover.masses.rocker, mirror)}
         {wheels[suspension.rocker_wheel]}
         <body name="bogie_{side}">
           <joint name="bogie_{side}" type="hinge" axis="0 1 0" pos={_point(bogie, mirror)}
-            damping="0.01"/>
-          {_write_inertia(rover.masses.bogie, mirror)}
+            damping="{damping}"/>
+          {_write_inertia(rover, rover.masses.bogie, mirror)}
           {hung}
         </body>
       </body>"""
@@ -128,11 +138,19 @@ def _motor_inertia(rover: Rover) -> float:
     return MOTOR_INERTIA * rover.total_mass / 6.0 * rover.wheel.radius**2
 
 
-def _write_inertia(part: Part, mirror: float) -> str:
-    """Return the MJCF inertia of a part, taken as a sphere with a radius of 0.1 m."""
-    moment = 0.4 * max(part.mass, 1e-3) * 0.1**2
+def _pivot_damping(rover: Rover) -> str:
+    """Return the damping of a pivot [N m s]; three digits: that of lsr1 is 0.01."""
+    radius = rover.wheel.radius
+    damping = PIVOT_DAMPING * rover.weight * radius * math.sqrt(radius / rover.gravity)
+    return f"{damping:.3g}"
+
+
+def _write_inertia(rover: Rover, part: Part, mirror: float) -> str:
+    """Return the MJCF inertia of a part, taken as a sphere as large as a wheel."""
+    mass = max(part.mass, LEAST_MASS * rover.total_mass)
+    moment = 0.4 * mass * rover.wheel.radius**2
     return (
-        f'<inertial pos={_point(part.com, mirror)} mass="{max(part.mass, 1e-3)}" '
+        f'<inertial pos={_point(part.com, mirror)} mass="{mass}" '
         f'diaginertia="{moment} {moment} {moment}"/>'
     )
 

@@ -6,6 +6,7 @@ It needs the package mujoco (extra `bench`). It shares only the rover's numbers 
 cylindrical wheels on a height field, and dry friction.
 """
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -22,10 +23,11 @@ from rover_planner.errors import PlanningError
 from rover_planner.simulator.mujoco_model import thin_out, write_model
 from rover_planner.simulator.plant import PlantState
 
-TIMESTEP = 0.004
-"""Time step of the simulation [s]."""
-DROP_HEIGHT = 0.02
-"""Height above the ground from which the rover is dropped [m]."""
+TIMESTEP, LONGEST_STEP = 0.004, 0.04
+"""Time step of the simulation [s]; a part of it for small rovers, for which it is longer than
+LONGEST_STEP times sqrt(wheel radius / gravity)."""
+DROPS = 5.0
+"""The rover is dropped from the height of a wheel radius over this."""
 SETTLING_TIME = 3.0
 """Time for which the servos hold the wheels after the drop, until the rover is at rest [s]."""
 SERVO_SHARE = 0.5
@@ -55,6 +57,12 @@ class WheelContacts:
     """(6,) slip speeds of the treads [m/s], load-weighted means; zero without contact."""
 
 
+def find_timestep(rover: Rover) -> float:
+    """Return the time step [s] that suits a rover; TIMESTEP is a multiple of it."""
+    longest = LONGEST_STEP * math.sqrt(rover.wheel.radius / rover.gravity)
+    return TIMESTEP / math.ceil(TIMESTEP / longest)
+
+
 class MujocoRover:
     """A rover on one terrain, moved by speeds or torques; with fixed wheels it skids in curves."""
 
@@ -64,7 +72,7 @@ class MujocoRover:
         terrain: Terrain,
         pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
         friction: float | None = None,
-        timestep: float = TIMESTEP,
+        timestep: float | None = None,
     ):
         """Drop a rover onto the ground and simulate until it is at rest.
 
@@ -74,7 +82,7 @@ class MujocoRover:
                 the friction of the cell below its centre.
             pose: x, y [m] and yaw [rad] of the body's origin.
             friction: Friction coefficient where the terrain has none; None takes the rover's.
-            timestep: Time step of the simulation [s].
+            timestep: Time step of the simulation [s]; None takes that of `find_timestep`.
 
         Raises:
             PlanningError: The terrain has unknown cells, or the pose is outside the terrain.
@@ -84,7 +92,7 @@ class MujocoRover:
         self.rover, self.terrain = rover, terrain
         self.friction = rover.friction if friction is None else friction
         self._model = mujoco.MjModel.from_xml_string(
-            write_model(rover, terrain, self.friction, timestep)
+            write_model(rover, terrain, self.friction, timestep or find_timestep(rover))
         )
         elevation = thin_out(terrain.elevation)
         span = np.ptp(elevation)
@@ -119,7 +127,8 @@ class MujocoRover:
         highest = self._height_above_ground(x, y, yaw)
         if not np.isfinite(highest):
             raise PlanningError(f"a rover at {pose} stands beyond the terrain")
-        self._data.qpos[:7] = x, y, highest + DROP_HEIGHT, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)
+        drop = self.rover.wheel.radius / DROPS
+        self._data.qpos[:7] = x, y, highest + drop, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)
         mujoco.mj_forward(self._model, self._data)
         self.servo(np.zeros(6), SETTLING_TIME)
         self._data.time = 0.0

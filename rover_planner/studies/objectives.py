@@ -16,14 +16,13 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
+from rover_planner.planning.path_query import waypoint_spacing_for
 from rover_planner.studies.study_file import STEP_TOLERANCE, Study, StudyDrive
 
-SPACING = 0.02
-"""Distance between waypoints [m]."""
 NO_LIMIT = 1e9
 """Value that disables a limit."""
-SEARCH_STEP = 0.02
-"""Increment of step heights in the search, before bisection [m]."""
+SEARCH_STEPS = 5.0
+"""Number of step heights in a wheel radius that are tried, before bisection."""
 MAX_STEP = 10.0
 """Tallest step that is tried [m]."""
 MAX_WAYPOINTS = 200_000
@@ -62,7 +61,7 @@ def level_loads(rover: Rover) -> Floats:
 def _score_drive(study: Study, rover: Rover, k: int) -> tuple[float, str]:
     """Return objective and note of drive k; all limits must hold except that of the objective."""
     drive, where = study.drives[k], f"drive {k + 1}"
-    path = drive.length * np.linspace(0.0, 1.0, _count_steps(drive.length) + 1)
+    path = drive.length * np.linspace(0.0, 1.0, _count_steps(rover, drive.length) + 1)
     x, y, yaw = drive.start
     poses = np.column_stack(
         [x + path * np.cos(yaw), y + path * np.sin(yaw), np.full_like(path, yaw)]
@@ -85,17 +84,18 @@ def _score_drive(study: Study, rover: Rover, k: int) -> tuple[float, str]:
     return verdict.min_tip_over_ratio * flat_angle, where
 
 
-def _count_steps(length: float) -> int:
-    """Return the number of steps of about SPACING along a length [m], at least 1.
+def _count_steps(rover: Rover, length: float) -> int:
+    """Return the number of steps from waypoint to waypoint along a length [m], at least 1.
 
     Raises:
         ModelError: There are more than MAX_WAYPOINTS.
     """
-    if not length / SPACING <= MAX_WAYPOINTS:
+    spacing = waypoint_spacing_for(rover)
+    if not length / spacing <= MAX_WAYPOINTS:
         raise ModelError(
-            f"a drive is {length:g} m long; it must be at most {MAX_WAYPOINTS * SPACING:g} m"
+            f"a drive is {length:g} m long; it must be at most {MAX_WAYPOINTS * spacing:g} m"
         )
-    return max(round(length / SPACING), 1)
+    return max(round(length / spacing), 1)
 
 
 def _make_axis(half: float, cell: float, aspect: float = 1.0) -> Floats:
@@ -125,13 +125,13 @@ def _lift_limit(study: Study, rover: Rover) -> Rover:
 def _ground(rover: Rover, drive: StudyDrive) -> Terrain:
     if drive.file is not None:
         return _load_once(drive.file)
-    half = drive.length + 2.0 * _length(rover) + abs(drive.start[0]) + abs(drive.start[1])
+    room = drive.length + abs(drive.start[0]) + abs(drive.start[1])
+    if drive.slope is None:
+        return step_ground(rover, drive.step or 0.0, room)
     cell = 0.2 * rover.wheel.radius
-    axis = _make_axis(half, cell)
+    axis = _make_axis(room + 2.0 * _length(rover), cell)
     x = np.broadcast_to(axis, (len(axis), len(axis)))
-    if drive.slope is not None:
-        return Terrain(np.tan(drive.slope) * x, cell, (axis[0], axis[0]))
-    return step_ground(rover, drive.step or 0.0)
+    return Terrain(np.tan(drive.slope) * x, cell, (axis[0], axis[0]))
 
 
 @lru_cache(maxsize=16)
@@ -143,12 +143,12 @@ def _length(rover: Rover) -> float:
     return rover.wheelbase + 2.0 * rover.wheel.radius
 
 
-def step_ground(rover: Rover, height: float) -> Terrain:
-    """Return level ground that rises by a step across x = 0."""
+def step_ground(rover: Rover, height: float, room: float = 0.0) -> Terrain:
+    """Return level ground that rises by a step across x = 0, with room [m] to all sides."""
     cell = 0.1 * rover.wheel.radius
-    half = 2.0 * _length(rover)
-    axis = _make_axis(half, cell, 0.6)
-    wide = _make_axis(0.6 * half, cell)
+    half, half_width = room + 2.0 * _length(rover), room + 1.2 * _length(rover)
+    axis = _make_axis(half, cell, half_width / half)
+    wide = _make_axis(half_width, cell)
     profile = np.where(axis > 0.0, height, 0.0)
     return Terrain(np.tile(profile, (len(wide), 1)), cell, (axis[0], wide[0]))
 
@@ -160,10 +160,11 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
     margin, clearance and drop. Heights are tried from low to high, because a rover may climb a
     step that is higher than one that it cannot climb.
     """
-    climbed, height = 0.0, SEARCH_STEP
+    step = rover.wheel.radius / SEARCH_STEPS
+    climbed, height = 0.0, step
     highest = min(4.0 * rover.wheel.radius, MAX_STEP)
     while height < highest and not why_not_climbed(rover, height, policy, friction):
-        climbed, height = height, height + SEARCH_STEP
+        climbed, height = height, height + step
     low, high = climbed, height
     while high - low > STEP_TOLERANCE:
         middle = 0.5 * (low + high)
@@ -181,7 +182,7 @@ def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | 
     )
     able = replace(rover, limits=limits)
     half = 0.75 * _length(rover)
-    x = np.linspace(-half, half, _count_steps(2.0 * half) + 1)
+    x = np.linspace(-half, half, _count_steps(rover, 2.0 * half) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
     judged = judge_paths(
         able,

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rover_physics.files.validation import show_file
+from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layout import Box
 from rover_planner.survey.map_source import Grids, MapFrame
@@ -125,7 +126,14 @@ class GeoTiffMap:
             heights = np.where(unknown, np.nan, values.data.astype(np.float64))
         if file.nodata is None:
             self._check_declared(heights)
-        return np.asarray((heights * file.scales[0] + file.offsets[0])[::-1])
+        heights = heights * file.scales[0] + file.offsets[0]
+        wrong = heights[np.abs(heights) > MAX_COORDINATE]
+        if wrong.size:
+            raise PlanningError(
+                f"{show_file(self.path)}: holds {wrong[0]:g}; heights must be finite and within "
+                f"{MAX_COORDINATE:g} m, or nodata"
+            )
+        return np.asarray(heights[::-1])
 
     def _check_declared(self, heights: np.ndarray) -> None:
         """Check that heights of a file without a nodata value are none that stand for it."""

@@ -60,7 +60,7 @@ STATES = (DISABLED, EMERGENCY_STOP, FAULT, STALLED, STANDSTILL, DRIVING)
 
 @dataclass(frozen=True, eq=False)
 class TractionCommand:
-    """What the wheels are to do after one update, and how that was found."""
+    """Torques of the wheels after one update, and how they were found."""
 
     torques: Floats
     """(6,) torques, wheel order [N m]."""

@@ -8,7 +8,7 @@ from itertools import permutations, takewhile
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, Terrain, judge_path
+from rover_physics import SweepOptions, judge_path
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.advice import case as case_module
 from rover_planner.advice import seek
@@ -21,6 +21,7 @@ from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_geometry import distance_along
 from support.grounds import make_terrain, rock_left
+from support.rough_grounds import enlarged
 from support.rovers import FIXED, LSR1, M2020, similar
 
 S = np.arange(-1.5, 1.6, 0.05)
@@ -212,9 +213,7 @@ def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):
 def test_the_way_around_is_as_long_for_the_size_of_the_rover(size):
     def way_around(size: float) -> float:
         rover = similar(LSR1, size)
-        ground = make_terrain(rock_left, half=3.0)
-        x, y = ground.origin
-        ground = Terrain(size * ground.elevation, size * ground.resolution, (size * x, size * y))
+        ground = enlarged(make_terrain(rock_left, half=3.0), size)
         poses = STRAIGHT * [size, size, 1.0]
         path = Case(rover, ground, poses).judge().path_around
         return distance_along(path)[-1]

@@ -13,6 +13,7 @@ from rover_planner.command.prediction_files import read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import read_assumptions
 from support.command_line import N, assert_refused, predict_arguments, write_ground_and_path
+from support.paths import poses_at
 
 
 def by_name(table):
@@ -116,12 +117,11 @@ def test_a_refused_path_is_still_exit_code_0_with_the_reason_and_nan(files, capf
 
 def test_waypoints_that_are_far_apart_are_warned_of(files, capfd):
     words = predict_arguments(files)
+    np.savez(files / "poses.npz", poses=poses_at(0.1 * np.arange(20)))  # a wheel radius apart
     assert main(words) == 0 and "warning" not in capfd.readouterr().err
-    with np.load(files / "poses.npz") as file:
-        ends = file["poses"][[0, 1, -1]]
-    np.savez(files / "poses.npz", poses=ends)
+    np.savez(files / "poses.npz", poses=poses_at([0.0, 0.1, 0.2012]))
     assert main(words) == 0
-    assert "from waypoint 1 to 2" in capfd.readouterr().err
+    assert "from waypoint 1 to 2 it is 0.1012 m" in capfd.readouterr().err
 
 
 def test_classes_and_torque_ranges_are_added_on_demand(files):

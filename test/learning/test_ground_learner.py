@@ -144,6 +144,17 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
+def test_a_drive_after_the_clock_was_set_back_is_learned_as_another_one():
+    rows = climb(ROVER, SLOPE, 12.0)[::2]
+    again = rows.copy()
+    again[:, TIME] -= 100.0
+    again[150:, X] = again[150, X]
+    learner = learn([*rows, *again])
+    assert learner.stuck
+    assert learner.estimate.friction.high < 1.3 * SLOPE
+    assert learner.estimate.resistance_std > 0.0
+
+
 def test_nothing_is_learned_from_rows_without_a_pose():
     rows = climb(ROVER, SLOPE, 5.0)
     rows[:, YAW] = np.nan

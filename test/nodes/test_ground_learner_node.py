@@ -65,9 +65,9 @@ class Rover(Node):
         stamp = ns_to_stamp(int(BEGIN * 1e9))
         self._map.publish(terrain_to_point_cloud(terrain, "map", stamp))
 
-    def send(self, row: np.ndarray) -> None:
+    def send(self, row: np.ndarray, begin: float = BEGIN) -> None:
         """Send what a row holds; the joints first, which the row of the odometry has."""
-        joints, odometry = row_messages(row, BEGIN)
+        joints, odometry = row_messages(row, begin)
         self.send_joints(joints)
         attitude = xyzw_from_rpy(*row[[ROLL, PITCH, YAW]])
         self.send_imu(attitude, np.zeros(3), odometry.header.stamp)
@@ -153,6 +153,15 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     assert last["friction"]["low"] > 0.5 * SLOPE
     read = parse_learned(json.dumps(last), ground_learner.ESTIMATE)  # as a server does
     assert read.classes.keys() == {7} and read.classes[7].low == pytest.approx(read.low)
+    told, set_back = (len(rover.estimates), len(rover.wheels)), BEGIN - 1000.0
+    row = rows[0]
+
+    def are_told() -> bool:
+        row[TIME] += 0.05
+        rover.send(row, set_back)
+        return len(rover.estimates) > told[0] + 1 and len(rover.wheels) > told[1] + 1
+
+    wait_until(are_told, "what is told after the clock was set back")
 
 
 def test_steering_and_imu_are_read_as_the_parameters_say(ros):

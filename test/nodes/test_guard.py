@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nothing that a callback raises ends a node, and what lasts or repeats is logged once."""
 
+import threading
 import time
 
 import pytest
@@ -8,6 +9,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
@@ -119,6 +121,20 @@ def test_a_message_that_is_left_alone_ends_no_wait(ros):
     while time.monotonic() < end:
         executor.spin_once(0.5)
     assert not node.heard and 5 <= executor.wait_sets <= 25
+    executor.shutdown()
+    node.destroy_node()
+
+
+def test_a_wait_ends_while_the_simulated_clock_stands(ros):
+    use_sim_time = Parameter("use_sim_time", value=True)
+    node = Node("waiter", context=ros.context, parameter_overrides=[use_sim_time])
+    executor = GuardedExecutor(context=ros.context)
+    executor.add_node(node)
+    waits = threading.Thread(
+        target=lambda: [executor.spin_once(timeout_sec=0.01) for _ in range(5)], daemon=True
+    )
+    waits.start()
+    wait_until(lambda: not waits.is_alive(), "the ends of waits", 5.0)
     executor.shutdown()
     node.destroy_node()
 

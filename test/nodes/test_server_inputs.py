@@ -72,6 +72,19 @@ def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu():
     assert (now.roll, now.pitch, now.yaw) == pytest.approx((0.1, -0.2, 0.3))
 
 
+def test_odometry_whose_stamp_stands_still_gets_old():
+    now = [0.0]
+    inputs = inputs_with(clock=lambda: now[0])
+    odometry = odometry_at((1.0, 2.0, 0.3))
+    odometry.header.stamp = Time(sec=5)
+    for now[0] in (0.0, 0.9, 1.8):
+        inputs.take_odometry(odometry)
+    assert inputs.find_here() is None
+    odometry.header.stamp = Time(sec=4)
+    inputs.take_odometry(odometry)
+    np.testing.assert_allclose(inputs.find_here(), (1.0, 2.0, 0.3))
+
+
 def test_ground_under_a_rover_is_filled_once_where_it_stands_and_again_where_it_crept_to():
     now = [0.0]
     inputs = inputs_with(clock=lambda: now[0])

@@ -158,6 +158,15 @@ def test_heights_that_stand_for_nothing_are_refused_where_no_nodata_is_declared(
     assert advised == value  # as GDAL compares it with the heights
 
 
+@pytest.mark.parametrize("value", [np.inf, -2e9])
+def test_a_height_that_no_ground_has_is_refused_by_file_and_value(tmp_path, value):
+    heights = np.zeros((40, 50), np.float32)
+    heights[3, 4] = value
+    path = write_tif(tmp_path / "a.tif", heights, nodata=-9999)
+    with pytest.raises(PlanningError, match=r"a\.tif: holds (inf|-2e\+09); heights must"):
+        GeoTiffMap(path).read((slice(0, 40), slice(0, 50)))
+
+
 def test_a_projection_in_kilometres_is_refused_in_one_line(tmp_path, capfd):
     """PROJ itself wrote a second line on stderr."""
     kilometres = "+proj=stere +lat_0=-90 +R=1737400 +units=km"

@@ -11,7 +11,7 @@ from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_planner.viewer.documents import paths
 from rover_planner.viewer.state.path_limits import Lane
-from rover_planner.viewer.state.scenario import CANDIDATES, Judged, Shown
+from rover_planner.viewer.state.scenario import CANDIDATES, JudgedPath, Shown
 from support.grounds import gap, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
@@ -21,7 +21,7 @@ def stepped(x, y):
     return waves(x, y) + 0.05 * (x > 0.3)
 
 
-def judged_on(height, start=-1.0, **options) -> Judged:
+def judged_on(height, start=-1.0, **options) -> JudgedPath:
     """Return a straight path to x = 1 m over a ground, judged."""
     options = SURE.change(count=1, **options)
     return session_on(height, (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0), options).shown.path

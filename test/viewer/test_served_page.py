@@ -336,7 +336,7 @@ def test_a_closed_page_leaves_no_thread_behind():
 def test_a_camera_sees_all_of_the_path_from_behind_or_above_and_the_rover_from_its_side(page):
     place = {"position": np.zeros(3), "look_at": np.ones(3)}
     camera = SimpleNamespace(fov=1.0, image_width=600, image_height=600, **place)
-    client, path = SimpleNamespace(camera=camera), page.scene.way
+    client, path = SimpleNamespace(camera=camera), page.scene.path_places
     middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
     away = {}
     for view in ("Fit", "Top", "Side"):

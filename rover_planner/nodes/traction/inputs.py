@@ -29,7 +29,7 @@ from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import joints_qos, newest_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.input_monitor import StampError
 from rover_planner.traction.traction_service import (
@@ -43,6 +43,8 @@ from rover_planner.traction.traction_service import (
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
 """Joints whose positions are read; a rover has the steering joints of its steered wheels."""
+LONGEST_PERIOD = 0.1
+"""Time between two readings of joint states, at most [s]."""
 REST_PERIOD = 0.1
 """Time between two readings of odometry by a rover at rest [s]."""
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
@@ -86,8 +88,8 @@ class TractionInputs:
 
     def _subscribe(self) -> None:
         hear = self._node.heard.subscribe
-        merged, newest = sensor_qos(), newest_qos()  # joints may come from several publishers
-        hear(JointState, JOINT_STATES, self._take_joints, merged, refuse=self._refuse)
+        joints, newest = joints_qos(LONGEST_PERIOD), newest_qos()
+        hear(JointState, JOINT_STATES, self._take_joints, joints, refuse=self._refuse)
         hear(Imu, IMU, self._take_imu, newest, refuse=self._refuse)
         hear(self._twist, CMD_VEL, self._take_command, newest, refuse=self._refuse)
         hear(Odometry, ODOMETRY, self._take_odometry, newest, self._needs_odometry, self._refuse)

@@ -19,6 +19,9 @@ from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
 
+MONITOR_OFFSET = 5.0
+"""Default of monitor_offset [wheel radii]."""
+
 
 @dataclass(frozen=True)
 class ServiceSettings:
@@ -40,6 +43,11 @@ class ServiceSettings:
         """Widest unknown region of a map that is interpolated [m]; 0 interpolates none."""
         values = self.parameters
         return values.max_gap if values.unknown_cells == INTERPOLATE else 0.0
+
+    @property
+    def monitor_offset(self) -> float:
+        """Distance from its path above which the rover is to stop [m]."""
+        return self.parameters.monitor_offset or MONITOR_OFFSET * self.rover.wheel.radius
 
     def on_ground(self, ground: LearnedGround | None) -> "ServiceSettings":
         """Return the settings of new questions; with USE they assume the learned ground."""
@@ -89,7 +97,7 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             ),
             map_sigmas=parameters.map_sigmas,
             accepted_chance=parameters.accepted_chance,
-        ),
+        ).fit(rover),
         lattice=LatticeSettings(
             budget=parameters.search_budget,
             cell=parameters.lattice_cell or None,

@@ -161,10 +161,12 @@ class TraverseService:
         """Keep what was learned of the ground, for new questions."""
         self._ground = ground
 
-    def mark(self, place: MarkedPlace) -> None:
-        """Keep a place as impassable."""
-        if place not in self.marked.places:
+    def mark(self, place: MarkedPlace) -> bool:
+        """Keep a place as impassable; return whether it is new."""
+        is_new = place not in self.marked.places
+        if is_new:
             self.marked = MarkedPlaces((*self.marked.places, place))
+        return is_new
 
     def snapshot(self, ros_time: int | None = None) -> Snapshot:
         """Return all that is known now.

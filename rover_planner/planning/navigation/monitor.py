@@ -30,9 +30,9 @@ IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
 """States of a monitor."""
 NO_POSE, NO_JOINTS, OFF_PATH, SUSPENSION = "no_pose", "no_joints", "off_path", "suspension"
 """Codes of a stop besides those of a verdict."""
-NEAR = 3.0
-"""Length of the part of the path that is judged before the whole rest [m]: the rover is told
-early of what is near."""
+NEAR = 30.0
+"""Length of the part of the path that is judged before the whole rest [wheel radii]: the rover is
+told early of what is near."""
 AROUND = 3.0
 """Map around that part that is looked at, in distances of the farthest wheel."""
 SHARE = 0.25
@@ -134,7 +134,7 @@ class PathMonitor:
         """
         if sight.pose is not None:
             offset = path.find_place(sight.pose).offset
-            if offset > sight.limits.monitor_offset:
+            if offset > sight.snapshot.settings.monitor_offset:
                 return False
         self._path, self._judged_on, self._pose_time = path, None, sight.time
         self._joints_time = None
@@ -185,7 +185,7 @@ class PathMonitor:
         last = self.finding.place
         place = path.find_place(sight.pose, None if last is None else last.index)
         self.finding = replace(self.finding, place=place)
-        most = sight.limits.monitor_offset
+        most = sight.snapshot.settings.monitor_offset
         if place.offset <= most:
             return None
         reason = f"the rover is {place.offset:.2f} m beside its path, limit {most:.2f} m"
@@ -251,7 +251,8 @@ class PathMonitor:
         What is refused whatever the errors of the map does not wait for them to be allowed for.
         """
         first = 0 if self.finding.place is None else self.finding.place.index
-        near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
+        length = NEAR * snapshot.settings.rover.wheel.radius
+        near = int(np.searchsorted(path.distances, path.distances[first] + length)) + 1
         if near < len(path.poses):
             ahead = path.poses[first:near]
             cut = _cut_map(snapshot, ahead)

@@ -16,6 +16,9 @@ from rover_planner.errors import PlanningError
 
 MEMORY = 10_000_000_000
 """Time for which transforms are kept [ns], as in tf2."""
+SET_BACK = 1_000_000_000
+"""Lead of the last stamp from which the clock was set back [ns]: messages that overtake each other
+differ by less."""
 
 
 class TransformError(PlanningError):
@@ -129,7 +132,7 @@ class TransformTree:
         """
         with self._lock:
             edge = self._edges.get(child)
-            stale = edge is not None and edge.stamps[-1] - stamp > MEMORY
+            stale = edge is not None and edge.stamps[-1] - stamp > SET_BACK
             if edge is None or edge.parent != parent or edge.is_static != is_static or stale:
                 edge = self._edges[child] = _Edge(parent, is_static)
             edge.add(stamp, rigid)

@@ -27,7 +27,7 @@ _ROUNDING = 1e-4
 """Distance from the edge of the map [cells] that counts as on it."""
 
 
-class GroundEstimate(NamedTuple):
+class LatticeGround(NamedTuple):
     """Estimates of all nodes."""
 
     groundless: NDArray[np.bool_]
@@ -52,7 +52,7 @@ class _Question(NamedTuple):
     """Largest distance of a wheel centre from its place on level ground [m], seen from above."""
 
 
-def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstimate:
+def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> LatticeGround:
     """Estimate all nodes.
 
     Args:
@@ -70,7 +70,7 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
         wheels - terrain.origin,
         largest_wheel_shift(rover),
     )
-    found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
+    found = LatticeGround(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
     at = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
     reach = swing_radius(rover)
     low, high = np.reshape(terrain.bounds, (2, 2)).T
@@ -127,7 +127,7 @@ def estimate_nodes(question, at, chosen, found):
         question: _Question.
         at: (n, 2) x and y of all places [m].
         chosen: (k,) the places to look at.
-        found: GroundEstimate of zeros, written where it differs.
+        found: LatticeGround of zeros, written where it differs.
     """
     for place in chosen:
         for heading in range(HEADINGS):

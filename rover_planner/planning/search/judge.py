@@ -82,7 +82,7 @@ class PathJudge:
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
     known: KnownPoses | None = None
-    """What the model has found along whole paths so far, None if that is not kept."""
+    """Results of the model along whole paths so far, None if that is not kept."""
     known_in_pieces: KnownPoses | None = None
     """The same along pieces, with the friction and torque limit for which they are judged."""
     poses: int = field(default=0, init=False)
@@ -153,7 +153,7 @@ class PathJudge:
         Goals on the start's side of a ring come first. If these cannot be reached, those behind
         them rarely can, and each goal costs the evaluation of all candidates.
         """
-        for ring in rings_within(start, goal, tolerance):
+        for ring in rings_within(start, goal, tolerance, self.rover.wheel.radius):
             judged = ((pose, self._judge_path(pose[None, :])) for pose in ring)
             standing = (pose for pose, one in judged if one.verdict.traversable)
             yield from itertools.islice(standing, _QUERIES_PER_RING)

@@ -266,7 +266,7 @@ class _PathFinder:
         left = np.hypot(*(path.poses[-1] - self._goal)[:2])
         if not self._to_frontier:
             return ""
-        return f"the goal is beyond the known ground; the way ends {left:.1f} m before it"
+        return f"the goal is beyond the known ground; the path ends {left:.1f} m before it"
 
     def _describe_extent(self) -> str:
         """Return what part of the map is searched, in words."""

@@ -41,6 +41,9 @@ class SearchQuery:
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "options", self.options.fit(self.rover))
+
 
 @dataclass(frozen=True)
 class LatticeSettings:

@@ -9,7 +9,7 @@ from rover_planner.advice.advise import STOPPED, Advice, grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.planning.assumptions import assume
-from rover_planner.viewer.state.scenario import Judged, Scenario
+from rover_planner.viewer.state.scenario import JudgedPath, Scenario
 
 PROMISED = 20.0
 """Time after which the page tells what was found so far, and that the search goes on [s]."""
@@ -19,12 +19,12 @@ PROMISED = 20.0
 class Advised:
     """A path and the advice on it."""
 
-    path: Judged
+    path: JudgedPath
     """The path."""
     since: float
     """When a visitor asked for advice, on the monotonic clock [s]."""
     advice: Advice | None = None
-    """What was found so far; None before the first result."""
+    """Advice that was found so far; None before the first result."""
 
     @property
     def remedies(self) -> list[Remedy]:

@@ -21,7 +21,7 @@ from rover_planner.studies.rover_values import RoverValue, get_value, list_value
 from rover_planner.viewer.state.colours import colour_use, to_css
 from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.path_limits import ON_THE_WAY, write
-from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
+from rover_planner.viewer.state.scenario import JudgedPath, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
 """Names of the torque policies on the page."""
@@ -71,7 +71,7 @@ def describe_verdict(shown: Shown) -> dict[str, Any]:
     reason, around = verdict.reason, shown.around
     if failure is not None and failure.is_between and not reason.startswith(ON_THE_WAY):
         reason = f"at the next waypoint: {reason}"  # of which a worse place comes before
-    closed = "" if around is None or around.path is not None else f"no way: {around.reason}"
+    closed = "" if around is None or around.path is not None else around.reason
     return {
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
@@ -107,9 +107,9 @@ def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:
     """Return what a click takes instead of a path that is refused: words, and what it asks."""
     if shown.offer is None:
         return []
-    kind = "path" if shown.offer < shown.generated else "way around, path"
+    around = "" if shown.offer < shown.generated else " around"
     length = shown.paths[shown.offer].length
-    words = f"{kind} {shown.offer + 1} passes ({length:.1f} m)"
+    words = f"path {shown.offer + 1}{around} passes ({length:.1f} m)"
     return [{"words": words, "ask": {"ask": "show", "index": shown.offer}}]
 
 
@@ -149,7 +149,7 @@ def describe_paths(
 
 
 def describe_limits(
-    path: Judged, reference: Judged | None, chance: FailureChance | None = None
+    path: JudgedPath, reference: JudgedPath | None, chance: FailureChance | None = None
 ) -> dict[str, Any]:
     """Return the curves of a path's lanes, those of the reference, of its chance, and the loads.
 
@@ -180,7 +180,7 @@ def describe_limits(
 
 
 def describe_uses(
-    path: Judged, time: float, chance: FailureChance | None = None
+    path: JudgedPath, time: float, chance: FailureChance | None = None
 ) -> list[dict[str, Any]]:
     """Return for each lane its use at a time [s] and the worst so far, with value and wheel."""
     limits, failure = path.limits.add_chance(chance), path.failure
@@ -327,7 +327,9 @@ def read_values(scenario: Scenario) -> dict[str, float]:
     return {one.label: get_value(data, one.keys[0]) for values in parts for one in values}
 
 
-def describe_changes(path: Judged, reference: Judged | None, is_kept: bool) -> dict[str, Any]:
+def describe_changes(
+    path: JudgedPath, reference: JudgedPath | None, is_kept: bool
+) -> dict[str, Any]:
     """Return what differs from the reference: numbers of the rover and the arm, and the drive."""
     if reference is None:
         return {"kept": is_kept, "rover": [], "drive": []}
@@ -345,9 +347,9 @@ def describe_changes(path: Judged, reference: Judged | None, is_kept: bool) -> d
     return {"kept": is_kept, "rover": rows, "drive": compare_drives(reference, path)}
 
 
-def compare_drives(before: Judged, now: Judged) -> list[list[str]]:
+def compare_drives(before: JudgedPath, now: JudgedPath) -> list[list[str]]:
     """Return name, value before and now of the drives along one path, up to their failures."""
-    reads: Mapping[str, Callable[[Judged], str]] = {
+    reads: Mapping[str, Callable[[JudgedPath], str]] = {
         "verdict": lambda one: "passes" if one.verdict.traversable else "refused",
         "driven": lambda one: write(float(one.trajectory.distance[-1]), 2, "m"),
         "time": lambda one: write(float(one.trajectory.times[-1]), 1, "s"),

@@ -48,7 +48,7 @@ class Channel:
         self._hear = hear
         self._lock = threading.Lock()
         self.parts: Mapping[str, Part] = {"program": uuid4().hex}
-        """What is shown, by name."""
+        """Parts that are shown, by name."""
         self._mailboxes: set[Mailbox] = set()
         self._server = serve(
             self._serve, host, port, process_request=_answer, max_size=MAX_MESSAGE

@@ -46,7 +46,7 @@ from rover_planner.viewer.live.live_state import (
     SIGN_OF_LIFE,
     LearnedTrail,
     LiveData,
-    Question,
+    LiveQuestion,
     TopicAge,
 )
 
@@ -82,7 +82,7 @@ class LiveListener(Node):
         self._ages: dict[str, TopicAge] = {}
         self._worked_at: float | None = None
         """Stamp of the last rates of the wheels [s]."""
-        self._click: Question | None = None
+        self._click: LiveQuestion | None = None
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
         )
@@ -160,7 +160,7 @@ class LiveListener(Node):
             start=stamped_pose(start, self._frame), goal=stamped_pose((*goal, yaw), self._frame)
         )
         hashed = plan_request_hash(request.start, request.goal, 0.0)
-        self._click = click = Question(CLICK, hashed, time.monotonic())
+        self._click = click = LiveQuestion(CLICK, hashed, time.monotonic())
         take = partial(self._on_answer, click)
         self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
 
@@ -168,7 +168,7 @@ class LiveListener(Node):
         """Follow the server's newest verdict again."""
         self._click = None
 
-    def _on_answer(self, click: Question, future: Any) -> None:
+    def _on_answer(self, click: LiveQuestion, future: Any) -> None:
         """Take the plan of a click."""
         plan = future.result().plan
         if plan.poses:
@@ -235,7 +235,7 @@ class LiveListener(Node):
         passes = status.level != DiagnosticStatus.ERROR
         name = f"question {about.get('request', '?')}, {about.get('service', '?')}"
         reason, hashed = "" if passes else status.message, about.get("question_hash", "")
-        self._data = replace(self._data, newest=Question(name, hashed, now, passes, reason))
+        self._data = replace(self._data, newest=LiveQuestion(name, hashed, now, passes, reason))
         click = self._click
         if click is not None and click.traversable is None and click.hash == hashed:
             click.since, click.reason, click.traversable = now, reason, passes

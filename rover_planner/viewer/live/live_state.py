@@ -55,7 +55,7 @@ class TopicAge:
 
 
 @dataclass(eq=False)
-class Question:
+class LiveQuestion:
     """A question to the server, and its answer as far as it has come."""
 
     name: str
@@ -74,10 +74,10 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class LearnedTrail:
-    """What a rover has learned of the ground, and where."""
+    """Ground that a rover has learned, and where."""
 
     ground: LearnedGround
-    """What was learned last."""
+    """Last estimate."""
     places: Floats = field(default_factory=lambda: np.empty((0, 3)))
     """(n, 3) x, y [m] and the friction that was known there: measured, or the least there is."""
 
@@ -120,18 +120,18 @@ class LiveData:
     """The map."""
     plan: Floats | None = None
     """(n, 3) poses of the newest plan of the server, x, y [m], yaw [rad]."""
-    newest: Question | None = None
-    """What the server has answered last, whoever asked."""
-    click: Question | None = None
+    newest: LiveQuestion | None = None
+    """Last answer of the server, whoever asked."""
+    click: LiveQuestion | None = None
     """The last question of a visitor; None without one."""
     learned: LearnedTrail | None = None
-    """What was learned of the ground."""
+    """Estimates of the ground along the drive."""
     ages: Mapping[str, TopicAge] = field(default_factory=dict)
     """The ages of all topics by name."""
 
     @property
     def freshness(self) -> str:
-        """Whether rover and server are live, in words."""
+        """State of rover and server in words."""
         odometry, server = self.ages[ODOMETRY], self.ages[SIGN_OF_LIFE]
         if odometry.age is None:
             return "waiting for odometry"

@@ -80,7 +80,7 @@ class PageBase(ABC):
 
         self._host, port = address
         self.ground, self.ground_name, self.survey = terrain, ground_name, survey
-        """What is shown."""
+        """Ground, its name and survey that are shown."""
         self.requests: Inbox[Action] = Inbox()
         self.colouring, self.forces = Colouring(self.layers[0]), True
         self._ended = threading.Event()
@@ -95,7 +95,7 @@ class PageBase(ABC):
         self.errors: dict[str, str] = {}
         """Why parts of its work have failed; each stays until the same part succeeds."""
         self.works: list[BackgroundWork] = []
-        """What works in the background."""
+        """Works in the background."""
         self._made_of: dict[str, tuple[Any, ...]] = {}
         self.scene = Scene(self.server)
         self.scene.canvas.move_to(terrain)

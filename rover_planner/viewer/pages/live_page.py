@@ -55,7 +55,7 @@ class LivePage(PageBase):
         """True if cameras look at where the rover was first seen."""
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, address, ground_name)
-        self.scene.way = AHEAD
+        self.scene.path_places = AHEAD
         self.paint()
         self.thread.start()
 
@@ -113,7 +113,7 @@ class LivePage(PageBase):
             steps = {name: ARM_STEP * round(joints[name] / ARM_STEP) for name in known}
             self.scene.rover.take(self._rover, steps)
             if not self._is_seen:
-                self._is_seen, self.scene.way = True, state.position[:2] + AHEAD
+                self._is_seen, self.scene.path_places = True, state.position[:2] + AHEAD
                 self.scene.look(START)
         if now - self._told_at > BOARD_PERIOD:
             self._told_at, tell = now, self.channel.tell

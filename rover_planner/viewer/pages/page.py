@@ -268,7 +268,7 @@ class Page(PageBase):
             self.playback.go_to(link.time)
         elif link.path <= len(session.shown.paths):
             session.show_path(link.path - 1)
-        elif self._judging.progress is None:  # no way around was found this time
+        elif self._judging.progress is None:  # no path around was found this time
             self._opening = None
 
     # What was judged.
@@ -301,7 +301,7 @@ class Page(PageBase):
             self._ended.wait(PERIOD)
         draw("the failure is not shown", scene.mark_failure, path.failure)
         draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm)
-        scene.way = path.poses[:, :2]
+        scene.path_places = path.poses[:, :2]
         draw("the cameras are not moved", lambda _: scene.look(FIT), asked.loaded)
         draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
         depends = self.colouring.layer in PREDICTED or self.survey is not None

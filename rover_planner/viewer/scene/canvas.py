@@ -57,7 +57,7 @@ class Canvas:
         self.radius = 0.0
         """Radius of the wheels of the rover that was drawn last [m]."""
         self.nodes: dict[str, Any] = {}
-        """What is shown, by name."""
+        """Nodes that are shown, by name."""
 
     def to_scene(self, points: ArrayLike) -> Floats:
         """Return points (..., 3) of the map frame in the scene [m]."""

@@ -42,7 +42,7 @@ class DrawnRover:
         self.state: RoverState | None = None
         """The state that is shown; None hides the rover."""
         self._looks: tuple[Any, ...] = ()
-        """What the shape of the rover and the length of its arrows depend on."""
+        """Values that the shape of the rover and the length of its arrows depend on."""
         self._arm: dict[str, float] = {}
         self.meshes: dict[str, tuple[str, colours.Colour]] = {}
         """Node and colour of each link by its name; that of a wheel is its tyre."""

@@ -15,7 +15,7 @@ from rover_planner.viewer.state.colours import (
     Colour,
     map_colours,
 )
-from rover_planner.viewer.state.scenario import Judged
+from rover_planner.viewer.state.scenario import JudgedPath
 
 MAX_POINTS = 250
 """Most points of a path that are drawn."""
@@ -55,7 +55,7 @@ class PathOverlay:
         self._numbers: Floats = np.empty((0, 3))
         """Places of the numbers of the paths [m]; none for a single path."""
 
-    def show(self, paths: Sequence[Judged], shown: int) -> None:
+    def show(self, paths: Sequence[JudgedPath], shown: int) -> None:
         """Draw paths instead of what was drawn before; `shown` is played, and wider."""
         self.paths, self._shown = [self._find_strands(one) for one in paths], shown
         self._canvas.remove(PATHS, [f"{PATHS}/{index}" for index in range(len(paths))])
@@ -112,7 +112,7 @@ class PathOverlay:
             paint = UNKNOWN if index in self._old else None
             self._canvas.show_lines(f"{PATHS}/{index}", strands, width, paint)
 
-    def _find_strands(self, path: Judged) -> list[Strand]:
+    def _find_strands(self, path: JudgedPath) -> list[Strand]:
         """Return a path in the colour of its verdict, faded from where it is refused."""
         points, verdict = path.poses[:, :2], path.verdict
         if verdict.traversable:
@@ -135,7 +135,7 @@ class PathOverlay:
         line = self._canvas.lay(points[rows], height)
         return Strand(line[np.isfinite(line[:, 2])], colour)
 
-    def _draw_numbers(self, paths: Sequence[Judged]) -> None:
+    def _draw_numbers(self, paths: Sequence[JudgedPath]) -> None:
         """Write the number of each path on it, one after another if there are several."""
         shares = np.linspace(*NUMBER_SHARES, len(paths))
         places = [

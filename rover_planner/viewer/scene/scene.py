@@ -49,7 +49,7 @@ class Scene:
         self.canvas = Canvas(server.scene)
         """Its nodes; all that is drawn goes through it."""
         self.paths = PathOverlay(self.canvas)
-        self.way: Floats = np.zeros((1, 2))
+        self.path_places: Floats = np.zeros((1, 2))
         """(n, 2) x and y of the path that cameras look at [m]; its height is 0 where the ground is
         not known."""
         self.rover = DrawnRover(self.canvas, "/rover")
@@ -106,7 +106,7 @@ class Scene:
         rover, state = self.rover.rover, self.rover.state
         if rover is None:
             return
-        path = self.canvas.lay(self.way, 0.0, 0.0)
+        path = self.canvas.lay(self.path_places, 0.0, 0.0)
         ahead = path[-1, :2] - path[0, :2]
         length = float(np.linalg.norm(ahead))
         ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])

@@ -38,7 +38,7 @@ class RoverState:
     rover: Rover
     """The rover."""
     here: PathPrediction
-    """What is predicted or measured, one row."""
+    """Prediction or measurement, one row."""
     spin: Floats
     """(6,) angles by which the wheels have turned [rad]."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a scenario step by step: the path, its reference, others, its chance, a way around."""
+"""Judges a scenario step by step: the path, its reference, others, its chance, a path around."""
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
@@ -18,10 +18,10 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import SearchResult, find_path
 from rover_planner.planning.search.query import SearchQuery
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
+from rover_planner.viewer.state.scenario import JudgedPath, Scenario, Shown
 
 PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
-SEARCH, BETTER = "searching a way", "way found, searching a better one"
+SEARCH, BETTER = "searching a path", "path found, searching a better one"
 """Names of steps."""
 Step = Progress | Shown
 """The beginning of a step, or what is known."""
@@ -92,7 +92,7 @@ def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Seque
         first_failure=first,
         reason=reasons[first] if first >= 0 else "",
     )
-    path = Judged(prediction.poses, prediction, verdict, scenario)
+    path = JudgedPath(prediction.poses, prediction, verdict, scenario)
     return Shown(scenario, (path,), 0, 1)
 
 
@@ -113,7 +113,7 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
 
 
 def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, None, Shown]:
-    """Judge the path that is looked at; ways that nobody looks at go with their values."""
+    """Judge the path that is looked at; paths that nobody looks at go with their values."""
     same, path, paths = before.scenario is asked, before.paths[index], before.paths
     generated = before.generated
     if not same:
@@ -132,7 +132,7 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
     return Shown(asked, paths, index, generated, None, policies, judged_for, chance, around)
 
 
-def _recall(shown: Shown, before: Shown | None, values: Scenario) -> Judged | None:
+def _recall(shown: Shown, before: Shown | None, values: Scenario) -> JudgedPath | None:
     """Return the path that is looked at as it was judged for other values, if it was."""
     poses = shown.path.poses
     if before is None or shown.path.is_of(poses, values):
@@ -178,24 +178,26 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
     asked = shown.scenario
     question = SearchQuery(asked.rover, asked.terrain, asked.start, asked.goal, asked.options)
     first = find_path(question, replace(asked.search, ends_at_first=True), memory)
-    yield _add_way(shown, first)
+    yield _add_path(shown, first)
     left = asked.search.budget - first.seconds
     if first.path is None or left <= 0.0:
         return
     yield Progress(BETTER)
     better = find_path(question, replace(asked.search, budget=left), memory)
     if better.cost < first.cost:
-        yield _add_way(shown, better)
+        yield _add_path(shown, better)
 
 
-def _add_way(shown: Shown, around: SearchResult) -> Shown:
-    """Return what is shown with a way as one more path, which nobody looks at yet."""
-    way = () if around.path is None else (Judged(**vars(around.path), scenario=shown.scenario),)
-    return replace(shown, paths=(*shown.paths, *way), around=around)
+def _add_path(shown: Shown, around: SearchResult) -> Shown:
+    """Return what is shown with a path around as one more, which nobody looks at yet."""
+    paths = shown.paths
+    if around.path is not None:
+        paths = (*paths, JudgedPath(**vars(around.path), scenario=shown.scenario))
+    return replace(shown, paths=paths, around=around)
 
 
-def _judge(scenario: Scenario, poses: Floats) -> Judged:
+def _judge(scenario: Scenario, poses: Floats) -> JudgedPath:
     """Judge a path up to its first failure, where its playback ends."""
     rover, terrain, options = scenario.rover, scenario.terrain, scenario.options
     candidate = check_path(rover, terrain, poses, options, stop_at_failure=True)
-    return Judged(**vars(replace(candidate, poses=poses)), scenario=scenario)
+    return JudgedPath(**vars(replace(candidate, poses=poses)), scenario=scenario)

@@ -75,7 +75,7 @@ def refine(values: NDArray[Any], size: tuple[int, int], order: int = 1) -> NDArr
 
 @dataclass(frozen=True)
 class Colouring:
-    """What the ground is coloured by."""
+    """A layer by which the ground is coloured."""
 
     layer: str = HEIGHT
     """Name of the layer."""

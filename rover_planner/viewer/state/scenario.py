@@ -25,8 +25,10 @@ from rover_planner.viewer.state.path_limits import (
 )
 
 Pose = tuple[float, float, float]
-CANDIDATES = PathQueryOptions(count=5, spacing=0.5)
+CANDIDATES = PathQueryOptions(count=5)
 """Options of the candidates that the page begins with."""
+SPACING = 5.0
+"""Distance between candidates half-way where none is told [wheel radii]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,10 @@ class Scenario:
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
     search: LatticeSettings = field(default_factory=LatticeSettings)
     """Options of the search of a path around obstacles."""
+
+    def __post_init__(self) -> None:
+        spacing = self.options.spacing or SPACING * self.loaded.wheel.radius
+        object.__setattr__(self, "options", self.options.change(spacing=spacing))
 
     @property
     def arm(self) -> dict[str, float]:
@@ -91,7 +97,7 @@ class Scenario:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged(Candidate):
+class JudgedPath(Candidate):
     """A path as it was judged for a scenario, and why; what follows is computed once."""
 
     scenario: Scenario
@@ -143,13 +149,13 @@ class Shown:
 
     scenario: Scenario
     """Values for which the path that is looked at was judged."""
-    paths: tuple[Judged, ...]
-    """Candidates, then ways around obstacles; each as it was judged last."""
+    paths: tuple[JudgedPath, ...]
+    """Candidates, then paths around obstacles; each as it was judged last."""
     index: int
     """Index of the path that is looked at."""
     generated: int
     """Number of candidates; paths beyond were searched."""
-    reference: Judged | None = None
+    reference: JudgedPath | None = None
     """The same path with the values of the reference; None if nothing differs from it."""
     by_policy: Mapping[str, Verdict | str] = field(default_factory=dict)
     """Its verdicts under torque policies that are known, or why a policy has none."""
@@ -162,7 +168,7 @@ class Shown:
     """The finding of a search around obstacles for the scenario; None if none was made."""
 
     @property
-    def path(self) -> Judged:
+    def path(self) -> JudgedPath:
         """The path that is looked at."""
         return self.paths[self.index]
 

@@ -8,7 +8,7 @@ import numpy as np
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import result_qos, topic_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import GOAL, SERVER, START, ask
 from support.ros_fixtures import call
@@ -45,3 +45,12 @@ def test_a_marked_place_stays_impassable_until_places_are_cleared(shared):
     clearer = client.create_client(Trigger, f"{SERVER}/clear_places")
     assert call(clearer, Trigger.Request()).message == "1 marked places cleared"
     assert client.can_traverse(START, GOAL).poses
+
+
+def test_a_server_that_starts_anew_knows_the_places_that_were_marked_before(start_server, client):
+    sender = client.create_publisher(String, f"{SERVER}/mark_place", result_qos())
+    place = {"x": 0.0, "y": 0.0, "radius": 0.3, "reason": "dust"}
+    for date in ("yesterday", "today"):
+        sender.publish(String(data=json.dumps(place | {"date": date})))
+    server = start_server()
+    wait_until(lambda: len(server.service.marked.places) == 2, "the places")

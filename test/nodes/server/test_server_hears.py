@@ -2,6 +2,7 @@
 """A traverse server hears parameters, maps, cancels and signals while it works on a question."""
 
 import threading
+import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -9,6 +10,8 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash, plan_request_hash
+from rover_physics import load_rover
+from rover_physics.names import WHEEL_JOINTS
 from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, begin_plan, verdict_of
@@ -42,6 +45,19 @@ def test_stamps_of_answers_differ_even_while_the_clock_is_paused(start_server, c
     plans = [client.can_traverse(START, GOAL) for _ in range(3)]
     stamps = [plan.header.stamp.nanosec for plan in plans]
     assert stamps == sorted(set(stamps)) and {plan.header.stamp.sec for plan in plans} == {0}
+
+
+def test_joints_that_are_sent_seldom_are_heard_beside_those_of_a_fast_publisher(
+    start_server, client
+):
+    server = start_server(planner="fan")
+    arm = load_rover("lsr1").manipulator.joints
+    client.send_joints(arm, [0.1, 0.2, 0.3])
+    for _ in range(100):
+        client.send_joints(WHEEL_JOINTS, [0.0] * 6)
+    time.sleep(0.1)
+    client.can_traverse(START, GOAL)
+    assert [server.service.joints[name] for name in arm] == [0.1, 0.2, 0.3]
 
 
 def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, client):

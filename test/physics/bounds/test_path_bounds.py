@@ -314,6 +314,12 @@ def test_soil_and_its_sinkage_are_bounded(policy):
     assert draw_path(LSR1, terrain, PATH, 0.0, 2, 0, **on_soil)[0][1] == 0
 
 
+def test_best_torques_on_soil_sink_no_wheel_deeper_than_its_bound():
+    """Equal torques, with which the other bounds are found, load the wheels otherwise."""
+    ground, on_soil = with_std(rocky(3), 0.0005), {"soil": "lunar_nominal", "policy": "optimal"}
+    assert draw_path(LSR1, ground, PATH, 0.0, 2, 0, **on_soil)[0][1] == 0
+
+
 def test_the_worst_friction_within_reach_counts():
     terrain = with_std(plane(0.2, 0.0, half=3.0), 0.003)
     patchy = np.full(terrain.elevation.shape, 0.8)
@@ -321,6 +327,19 @@ def test_the_worst_friction_within_reach_counts():
     sure = bounds_on(LSR1, terrain)[1].friction_utilisation[..., 1]
     mixed = bounds_on(LSR1, replace(terrain, friction=patchy))[1].friction_utilisation[..., 1]
     np.testing.assert_allclose(mixed, 2.0 * sure, rtol=1e-6)
+
+
+def test_ground_beside_a_wheel_counts_where_the_wheel_may_move_sideways():
+    """The left wheels stand half a millimetre beside slippery ground."""
+    terrain = with_std(plane(0.2, 0.0, half=3.0), 0.003)
+    slippery, edge = np.full(terrain.elevation.shape, 0.8), 0.38
+    y = terrain.origin[1] + RESOLUTION * np.arange(len(slippery))
+    slippery[y > edge] = 0.4
+    outside = LSR1.suspension.wheels["rear"][1] + 0.5 * LSR1.wheel.width
+    poses = poses_at(np.zeros(1), edge - 0.0005 - outside, 0.0)
+    _, bounds = bounds_on(LSR1, replace(terrain, friction=slippery), poses)
+    right, left = np.split(bounds.friction_utilisation[0, :, 1], 2)
+    np.testing.assert_allclose(left, 2.0 * right, rtol=0.05)
 
 
 def test_an_uncertain_map_is_packed_without_copies_of_its_ends():

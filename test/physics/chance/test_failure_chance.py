@@ -58,6 +58,16 @@ def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs_all_along_a
     assert set(found.failure_chance_at) == {found.failure_chance}
 
 
+@pytest.mark.parametrize(("policy", "slope"), [("equal", 0.4), ("servo", 0.72), ("optimal", 0.72)])
+def test_the_friction_of_a_coulomb_soil_is_as_uncertain_as_any(policy, slope):
+    ground, rover = plane(slope, 0.0), rover_with(friction=0.1)
+    on_soil, told = (
+        chance_on(ground, rover, SweepOptions(policy, **options)).failure_chance
+        for options in ({"soil": "firm_ground"}, {"friction": 0.8})
+    )
+    assert 0.1 < on_soil == told < 1.0
+
+
 def test_samples_over_the_error_of_the_model_are_spread_as_told():
     told = Uncertainty()
     groups = draw_samples(told, SAMPLES, PLACES)

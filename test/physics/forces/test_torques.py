@@ -11,7 +11,15 @@ from hypothesis import strategies as st
 from rover_physics import SweepOptions, Terrain, find_torque_ranges, judge_path, judge_poses
 from support.best_torques import INSIDE, can_stand, solve_forces
 from support.reference_cases import reference_ground
-from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
+from support.rough_grounds import (
+    RESOLUTION,
+    fractal,
+    plane,
+    random_poses,
+    rocky,
+    scaled_for,
+    smooth,
+)
 from support.rover_geometry import balance_matrix
 from support.rovers import LSR1, M2020
 
@@ -43,6 +51,51 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
         assert not can_stand(LSR1, prediction, i, (used - 1e-4) / 1.005, max_torque)
         assert prediction.torque_saturation[i].max() <= 1.0 + 1e-9
     assert compared >= 2
+
+
+@pytest.mark.parametrize(("limit", "margin"), [(1.0, 0.2), (0.8, 0.0)])
+def test_more_friction_refuses_no_pose(limit, margin):
+    """Lateral forces need not be free where there is more of it."""
+    rocks = rocky(11, half=1.2)
+    banked = rocks.elevation + 0.4 * np.linspace(0.0, 2.4, len(rocks.elevation))[:, None]
+    ground, poses = replace(rocks, elevation=banked), random_poses(11, 40, 0.6)
+    rover = replace(LSR1, limits=replace(LSR1.limits, friction_utilisation=limit))
+    passed = set()
+    for friction in np.arange(0.4, 0.7, 0.02):
+        options = SweepOptions("optimal", margin, friction=friction)
+        codes = judge_poses(rover, ground, poses, options=options)[1].codes
+        passes = {i for i, code in enumerate(codes) if not code}
+        assert passed <= passes
+        passed = passes
+    assert passed
+
+
+@pytest.mark.parametrize(
+    ("soil", "slope"), [("dry_sand", 0.2), ("dry_sand", -0.4), ("lunar_nominal", -0.4)]
+)
+def test_no_torques_use_less_of_soil_than_the_best_ones(soil, slope):
+    """Braking, too: the resistance of soil helps there."""
+    ground, poses = plane(slope, 0.1), random_poses(6, 4, 0.1) * [1.0, 1.0, 0.2]
+    options = SweepOptions("optimal", soil=soil, max_torque=20.0)
+    prediction = judge_poses(LSR1, ground, poses, np.zeros(4), options)[0]
+    for i, used in enumerate(prediction.friction_utilisation.max(axis=1)):
+        assert can_stand(LSR1, prediction, i, used * (1.0 + 1e-6), 20.0)
+        assert not can_stand(LSR1, prediction, i, 0.98 * used, 20.0)
+
+
+def test_a_wheel_that_cannot_pull_itself_is_dragged_by_the_others():
+    heavy, ground = replace(M2020, gravity=9.81), plane(0.0, 0.0, half=3.0)
+    x, y = np.meshgrid(*[ground.origin[0] + RESOLUTION * np.arange(len(ground.elevation))] * 2)
+    soft = replace(
+        ground, soil=1 * ((x > 0.5) & (y > 0.5)), soil_names=("firm_ground", "mars_simulant")
+    )
+    equal, optimal = (
+        judge_poses(heavy, soft, [[0.0, 0.0, 0.0]], [0.0], SweepOptions(policy))[0]
+        for policy in ("equal", "optimal")
+    )
+    assert np.isinf(equal.friction_utilisation[0]).tolist() == [False] * 5 + [True]
+    assert optimal.friction_utilisation.max() <= 1.0
+    assert np.abs(optimal.tangential[0].sum()) <= 1e-6 * heavy.weight
 
 
 def turn_on_a_bank(options):

@@ -153,6 +153,14 @@ def test_a_drop_does_not_depend_on_where_waypoints_are():
     assert np.ptp(drops, axis=0).max() < 1e-3
 
 
+def test_between_waypoints_a_wheel_radius_apart_a_drop_is_found_however_they_are_rounded():
+    for x in (0.0, 3.0, 100.3):
+        ground = replace(EDGE, origin=(EDGE.origin[0] + x, EDGE.origin[1]))
+        path = drive_path(RADIUS) + poses_at(x)
+        prediction = judge_path(FREE, ground, path, SweepOptions(friction=0.8))[0]
+        np.testing.assert_allclose(prediction.wheel_drop.max(axis=0), 0.1207, atol=1e-3)
+
+
 @pytest.mark.parametrize(("policy", "friction"), [("equal", 0.3), ("optimal", 0.2)])
 def test_a_wheel_rolls_down_a_smooth_bump_however_slippery_if_the_others_hold_it(policy, friction):
     def bump(x, y):

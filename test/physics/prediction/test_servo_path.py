@@ -97,3 +97,10 @@ def test_a_higher_step_costs_more_energy_hardly_depending_on_the_spacing_of_wayp
     )  # fmt: skip
     assert (np.diff(coarse) > 3.0).all()
     np.testing.assert_allclose(fine, coarse, rtol=0.1)
+
+
+def test_a_turn_about_a_wheel_costs_the_power_of_the_wheels_in_its_time():
+    radius = LSR1.suspension.wheels["middle"][1]
+    path = arc_of(1.0 / radius, np.linspace(0.0, 0.4, 41))
+    found = judge_path(LSR1, fractal(4), path, SERVO)[0]
+    assert found.energy[-1] == pytest.approx(np.trapezoid(found.power, found.time), rel=0.15)

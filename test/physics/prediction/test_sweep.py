@@ -2,6 +2,7 @@
 """Sweeps: bad arguments, waypoints on their own, time and energy, scores, several at once."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from unittest.mock import Mock
 
 import numpy as np
@@ -28,8 +29,9 @@ from support.grounds import gap, make_terrain, waves
 from support.grounds import rocky as low_rock
 from support.paths import poses_at
 from support.predictions import assert_same
-from support.rough_grounds import plane, random_poses, rocky, with_std
-from support.rovers import LSR1
+from support.rough_grounds import plane, random_poses, rocky, scaled_for, with_std
+from support.rover_geometry import place_rover
+from support.rovers import LSR1, M2020
 
 LEVEL = plane(0.0, 0.0)
 POSE = [[0.0, 0.0, 0.0]]
@@ -97,15 +99,42 @@ def test_paths_swept_together_are_as_swept_one_by_one(policy):
         assert_same(prediction.between, alone.between)
 
 
+def lifted(rover, prediction):
+    """Return the work against gravity along a path [J]."""
+    parts = [place_rover(rover, prediction, i).masses for i in (0, -1)]
+    start, end = (sum(mass * place[2] for mass, place, *_ in some) for some in parts)
+    return rover.gravity * (end - start)
+
+
 def test_uphill_time_is_that_of_the_way_and_energy_of_the_weight_lifted_and_brakes_give_none():
     down = judge_path(LSR1, plane(-0.3, 0.0), line(-0.3, 0.3))[0]
     assert (down.torque < 0.0).all() and down.energy[-1] == 0.0
     up = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))[0]
-    lifted = LSR1.weight * np.ptp(up.position[:, 2])
-    assert up.energy[0] == 0.0 and up.energy[-1] == pytest.approx(lifted, rel=1e-4)
+    assert up.energy[0] == 0.0 and up.energy[-1] == pytest.approx(lifted(LSR1, up), rel=1e-4)
     assert up.time[0] == 0.0 and up.distance[-1] == pytest.approx(0.6)
     way = 0.6 * np.hypot(1.0, 0.3)
     assert up.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+@pytest.mark.parametrize(
+    "height",
+    [
+        lambda x, y: 0.03 * np.log1p(np.exp(x / 0.1)),
+        lambda x, y: 0.2 * x + 0.08 * np.sin(3.0 * x),
+        lambda x, y: 0.1 * np.exp(-((x / 0.3) ** 2)),
+    ],
+    ids=["ramp", "waves", "bump"],
+)
+def test_a_way_costs_more_than_the_way_back_by_the_weight_that_it_lifts(height, rover, policy):
+    """Without slip nothing is lost; braking wheels of the one way drive on the other."""
+    ground, path = scaled_for(rover, make_terrain(height, 0.02, 1.6), line(-0.8, 0.8, 161))
+    options = SweepOptions(policy, friction=2.0, max_torque=1e5)
+    way = judge_path(rover, ground, path, options)[0]
+    back = judge_path(rover, ground, path[::-1], replace(options, backward=True))[0]
+    spent = way.energy[-1], back.energy[-1]
+    assert spent[0] - spent[1] == pytest.approx(lifted(rover, way), abs=0.005 * sum(spent))
 
 
 @pytest.mark.parametrize(("ground", "shape"), [(low_rock, (5, 8)), (gap, (60, 50))])

@@ -46,7 +46,7 @@ def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
 
 @pytest.fixture(scope="module")
 def around():
-    """Return question and answer of a way around a wall, and what is remembered of it."""
+    """Return question and answer of a path around a wall, and what is remembered of it."""
     question, memory = ask(make_terrain(long_wall)), EdgeMemory()
     return question, find_path(question, LONG, memory), memory
 

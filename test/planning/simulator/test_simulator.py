@@ -20,8 +20,8 @@ from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, waves
-from support.rough_grounds import plane
-from support.rovers import FIXED, LSR1
+from support.rough_grounds import enlarged, plane, rocky
+from support.rovers import FIXED, LSR1, similar
 
 STEP, SPEED = 0.02, 0.06
 WAVY, LEVEL = make_terrain(waves, half=3.0), plane(0.0, 0.0, half=3.0)
@@ -55,6 +55,17 @@ def test_the_rover_is_where_the_model_settles_it():
     rates = [state.joint_velocities[name] for name in WHEEL_JOINTS]
     assert turned == pytest.approx(np.full(6, 0.3 / LSR1.wheel.radius), rel=0.02)
     assert rates == pytest.approx(np.full(6, 0.6), rel=0.1)
+
+
+@pytest.mark.parametrize("size", [0.1, 5.0])
+def test_a_rover_of_another_size_drives_alike_over_rocks_in_mujoco(size):
+    def drive_over_rocks(rover, size):
+        plant = MujocoRover(rover, enlarged(rocky(3, half=2.0), size), (-0.6 * size, 0.0, 0.0))
+        plant.drive(2.0 * rover.nominal_speed, 0.0, 8.0 * np.sqrt(size))
+        return plant.position / size
+
+    there = drive_over_rocks(similar(LSR1, size), size)
+    assert there == pytest.approx(drive_over_rocks(LSR1, 1.0), abs=0.015)
 
 
 def test_no_wheel_turns_faster_than_its_motor_where_it_drops_off_an_edge():

@@ -31,7 +31,7 @@ from rover_planner.viewer.live.live_state import (
     TRAIL_STEP,
     LearnedTrail,
     LiveData,
-    Question,
+    LiveQuestion,
     TopicAge,
     choose_answer,
     describe_learned,
@@ -227,9 +227,9 @@ NOW = 1000.0
 ALIVE = TopicAge(time.monotonic() + 1e6, True)
 
 
-def question(name: str, passes: bool | None, age: float, plan=None) -> Question:
+def question(name: str, passes: bool | None, age: float, plan=None) -> LiveQuestion:
     reason = "a wheel slips" if passes is False else ""
-    return Question(name, "0", NOW - age, passes, reason, plan)
+    return LiveQuestion(name, "0", NOW - age, passes, reason, plan)
 
 
 def data_of(newest, plan, click=None, server=ALIVE) -> LiveData:

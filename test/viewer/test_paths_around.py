@@ -38,33 +38,33 @@ def list_steps(session: ViewSession) -> list[str | int]:
     return [one.what if isinstance(one, Progress) else len(one.paths) for one in steps]
 
 
-def test_beyond_a_wall_with_a_gap_a_way_is_offered_and_the_path_looked_at_stays():
+def test_beyond_a_wall_with_a_gap_a_path_around_is_offered_and_the_path_looked_at_stays():
     session = walled_session(wall_with_gap)
     session.plan_to(BEYOND)
     shown = session.shown
-    *direct, way = shown.paths
+    *direct, around = shown.paths
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
-    assert shown.around.outcome == FOUND and shown.path is not way and shown.offer == 5
+    assert shown.around.outcome == FOUND and shown.path is not around and shown.offer == 5
     [offer] = describe_verdict(shown)["offers"]
-    assert offer["words"].startswith("way around, path 6 passes")
+    assert offer["words"].startswith("path 6 around passes")
     ends = shown.scenario.start[:2], BEYOND
-    np.testing.assert_allclose(way.poses[[0, -1], :2], ends, atol=1e-9)
+    np.testing.assert_allclose(around.poses[[0, -1], :2], ends, atol=1e-9)
 
 
-def test_the_first_way_is_shown_before_a_better_one_is_searched():
+def test_the_first_path_around_is_shown_before_a_better_one_is_searched():
     steps = list_steps(walled_session(wall_with_gap, GOAL, ends_at_first=False))
     after = steps[steps.index(SEARCH) + 1 :]
     assert after in ([6, BETTER], [6, BETTER, 6])
 
 
-def test_where_there_is_no_way_the_reason_is_told():
+def test_where_there_is_no_path_the_reason_is_told():
     session = walled_session(whole_wall, GOAL)
     session.ask()
     shown = session.shown
     assert shown.around.outcome == NO_WAY and len(shown.paths) == 5
     details = describe_verdict(shown)["details"]
     assert details[0] == shown.verdict.reason
-    assert details[1].startswith("no way: no path within the map: ") and "closed in" in details[1]
+    assert details[1].startswith("no path within the map: ") and "closed in" in details[1]
 
 
 def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recorded_path():
