@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from msg_adapters.errors import MessageError
-from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
+from rover_physics.numerics.quaternions import rpy_from_xyzw
 
 NORM_TOLERANCE = 0.01
 """Largest deviation of a quaternion's norm from 1."""
@@ -42,7 +42,7 @@ def check_norm(
     Raises:
         MessageError: It is not; `what` names it.
     """
-    norm = length_of(xyzw)
+    norm = math.hypot(*xyzw)  # never overflows
     if not abs(norm - 1.0) <= tolerance:
         wrong = f"has length {norm:.3g}" if math.isfinite(norm) else "is not finite"
         raise MessageError(

@@ -1,25 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Status codes of contacts, poses and bounds, and torque policies, for kernels and results."""
+"""Status codes of poses and bounds, and torque policies, for kernels and results."""
 
 from enum import IntEnum
 
 
-class ContactStatus(IntEnum):
-    """Ground below the samples of a wheel; the numbers are those of `PoseStatus`."""
-
-    IN_CONTACT = 0
-    """All samples of the wheel are over known ground."""
-    OFF_MAP = 1
-    """A sample is beyond the edge of the map."""
-    UNKNOWN_GROUND = 2
-    """A sample is over ground of unknown height."""
-
-
 class PoseStatus(IntEnum):
-    """How far a pose could be evaluated, and what stopped it."""
+    """How far a pose, or the contact of a wheel, could be evaluated, and what stopped it."""
 
     SETTLED = 0
-    """All six wheels touch the ground, and the forces balance."""
+    """All six wheels touch the ground, and the forces balance; a wheel is over known ground."""
     OFF_MAP = 1
     """A wheel would be beyond the edge of the map."""
     UNKNOWN_GROUND = 2
@@ -63,7 +52,7 @@ class TorquePolicy(IntEnum):
 
 
 class Stall(IntEnum):
-    """Why no forward speed of a rover on speed servos balances; SLIDING also where one does."""
+    """Why a rover stands, with torque policies that a wheel is wedged; SLIDING where it drives."""
 
     SLIDING = 0
     """The wheels slide."""

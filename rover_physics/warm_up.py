@@ -11,9 +11,7 @@ import numpy as np
 
 from rover_physics.bounds.path import find_bounds
 from rover_physics.compilation import compile_groups
-from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.sweep import predict_steered
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import new_results
 from rover_physics.rover.model import Rover
@@ -22,12 +20,6 @@ from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.torque_ranges import find_torque_ranges
-
-
-def pack_rover() -> None:
-    """Pack a rover and find when it tips over."""
-    pack_model(*_rover_and_step())
 
 
 def evaluate_poses() -> None:
@@ -55,19 +47,6 @@ def bound_poses() -> None:
     find_bounds(pack_model(rover, step), grounds, np.zeros((1, 3)), results)
 
 
-def score_map() -> None:
-    """Score a pose, as hazard maps and searches do for many."""
-    score_poses(*_rover_and_step(), np.zeros((1, 3)))
-
-
-def evaluate_single_poses() -> None:
-    """Find torque ranges, and predict a rover with given steering angles."""
-    rover, step = _rover_and_step()
-    poses = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
-    find_torque_ranges(rover, step, poses)
-    predict_steered(pack_model(rover, step), poses, np.array([0.05, 0.0, 0.0]), np.zeros(6))
-
-
 def _rover_and_step() -> tuple[Rover, Terrain]:
     """Return a rover and a map with a step and all layers that questions look at."""
     layer = np.ones((64, 64))
@@ -75,14 +54,10 @@ def _rover_and_step() -> tuple[Rover, Terrain]:
     return load_rover("lsr1"), replace(step, friction=layer)
 
 
-EXACT = (pack_rover, evaluate_poses, judge_paths)
-"""All that a question needs on a map whose heights are exact."""
+EXACT = (evaluate_poses, judge_paths)
+"""All that needs a map whose heights are exact: questions, scores, torque ranges."""
 UNCERTAIN = (bound_poses,)
 """All that a question needs besides on other maps."""
-SCORES = (score_map,)
-"""All that scores of single poses need."""
-SINGLE = (evaluate_single_poses,)
-"""All that torque ranges and a rover with measured steering angles need."""
 
 
 def warm_up() -> None:
@@ -94,6 +69,4 @@ def warm_up() -> None:
 if __name__ == "__main__":
     from rover_physics import warm_up as here  # the name by which processes find the steps
 
-    compile_groups(
-        [(*here.EXACT, *here.SCORES, *here.SINGLE), here.UNCERTAIN], print, os.cpu_count() or 1
-    )
+    compile_groups([here.EXACT, here.UNCERTAIN], print, os.cpu_count() or 1)

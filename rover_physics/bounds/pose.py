@@ -16,7 +16,6 @@ import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.settling import (
-    GroundSlope,
     find_step,
     limit_step,
     write_gap_rates,
@@ -26,7 +25,7 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.numerics.records import record_type
 from rover_physics.rover.linkage import place, rocker_sign
-from rover_physics.status import BoundStatus, ContactStatus
+from rover_physics.status import BoundStatus, PoseStatus
 
 NOMINAL_GAP = 1e-2
 """Largest gap [wheel radii] of a wheel in the predicted configuration. Next to rocks the search
@@ -120,10 +119,10 @@ def _find_heights(uncertain, work):
         if in_doubt and abs(gap) > EXTREME_GAP * linkage.radius:
             spread.low[wheel] -= abs(gap)
             spread.high[wheel] += abs(gap)
-    write_gap_rates(linkage, placement, contacts, GroundSlope.LEVEL, spread.rates)
+    write_gap_rates(linkage, placement, contacts, spread.rates, sloped=False)
     if not _invert(spread.rates, rover.J, spread.lift):
         return BoundStatus.ON_EDGE
-    write_gap_rates(linkage, placement, contacts, GroundSlope.SLOPED, spread.rates)
+    write_gap_rates(linkage, placement, contacts, spread.rates, sloped=True)
     if not _invert(spread.rates, rover.J, spread.response):
         return BoundStatus.ON_EDGE
     return BoundStatus.BOUNDED
@@ -242,8 +241,8 @@ def _find_contact_on(model, rover, wheel):
     """Find the contact of a wheel on one surface; return a BoundStatus."""
     contacts = rover.contacts
     outcome = find_contact(model, rover, wheel, SearchScope.QUICK)
-    if outcome != ContactStatus.IN_CONTACT or contacts.gap[wheel] != contacts.gap[wheel]:
-        off_map = outcome == ContactStatus.OFF_MAP
+    if outcome != PoseStatus.SETTLED or contacts.gap[wheel] != contacts.gap[wheel]:
+        off_map = outcome == PoseStatus.OFF_MAP
         return BoundStatus.OFF_MAP_NEAR if off_map else BoundStatus.UNKNOWN_NEAR
     find_contact(model, rover, wheel, SearchScope.FULL)
     return BoundStatus.BOUNDED
@@ -286,7 +285,7 @@ def _approach(uncertain, work):
             return outcome, worst
         if attempt == EXTREME_STEPS - 1:
             break
-        if not find_step(linkage, rover, GroundSlope.SLOPED):
+        if not find_step(linkage, rover, sloped=True):
             return BoundStatus.ON_EDGE, worst
         share = limit_step(rover.step, MAX_TURN)
         if attempt > 3:

@@ -11,8 +11,9 @@ import numpy as np
 from rover_physics.numerics.arrays import Floats, freeze_fields
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.rover.uncertainty import Uncertainty
-from rover_physics.terrain.grid import LAYERS, Terrain
+from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import new_ground, with_soils
+from rover_physics.terrain.terrain_file import GRIDS
 
 DEVIATES = {
     "friction": 1,
@@ -182,7 +183,7 @@ def cut_around(terrain: Terrain, places: Floats, margin: float) -> Terrain:
     columns, rows = (slice(a, b + 2) for a, b in zip(first, last, strict=True))
     layers: dict[str, Any] = {
         name: None if layer is None else np.ascontiguousarray(layer[rows, columns])
-        for name in LAYERS
+        for name in GRIDS
         for layer in (getattr(terrain, name),)
     }
     x, y = np.asarray(terrain.origin) + terrain.resolution * first

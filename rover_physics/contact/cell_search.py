@@ -17,7 +17,7 @@ from rover_physics.contact.contact_record import NOTICED
 from rover_physics.contact.intrusion import ROUNDING, begin_search, is_below, is_beside, take_point
 from rover_physics.contact.tracking import keep_contact, take_circle
 from rover_physics.numerics.kernels import kernel
-from rover_physics.status import ContactStatus
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.ground import elevation_of
 
 BEND = 0.126
@@ -41,11 +41,11 @@ def look_everywhere(model, work, wheel, tops):
         tops: Highest ground [m] below the rear half and below the front half; infinite if unknown.
 
     Returns:
-        UNKNOWN_GROUND if ground below the wheel is unknown, else IN_CONTACT.
+        UNKNOWN_GROUND if ground below the wheel is unknown, else SETTLED.
     """
     contacts, search = work.contacts, work.cells
     if not work.placement.up[wheel, 2] > LEAST_UPRIGHT:
-        return ContactStatus.IN_CONTACT
+        return PoseStatus.SETTLED
     begin_search(model, work, wheel)
     status = _look_at_vertices(model.ground, search, tops)
     if search.found:
@@ -98,13 +98,13 @@ def _look_at_vertices(ground, search, tops):
     low_s = -_find_extent(search, rear, tilt, scale)
     high_s = _find_extent(search, front, tilt, scale)
     if not low_s < high_s:
-        return ContactStatus.IN_CONTACT
+        return PoseStatus.SETTLED
     # A cell more on all sides: cells extend beyond the footprint.
     more = abs(ex) + abs(ey)
     low_s, high_s, low_t, high_t = low_s - more, high_s + more, low_t - more, high_t + more
     high_y = max(low_s * ey, high_s * ey) + max(low_t * ex, high_t * ex)
     low_y = min(low_s * ey, high_s * ey) + min(low_t * ex, high_t * ex)
-    status = ContactStatus.IN_CONTACT
+    status = PoseStatus.SETTLED
     first = max(int64(np.ceil(search.y + low_y)), 0)
     last = min(int64(np.floor(search.y + high_y)), ground.rows - 1)
     slant_x, slant_y = 1.0 / away_from_zero(ex), 1.0 / away_from_zero(ey)
@@ -122,7 +122,7 @@ def _look_at_vertices(ground, search, tops):
             if base + (top - curl * s * s) > search.best:
                 _look_around(ground, search, (i, j), (s, t, base))
             elif base != base and abs(s) < R and is_below(search, s, t):
-                status = ContactStatus.UNKNOWN_GROUND
+                status = PoseStatus.UNKNOWN_GROUND
     return status
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from rover_physics.contact.contact_record import RIMS, SearchScope, point_of_rim
 from rover_physics.numerics.kernels import kernel
-from rover_physics.status import ContactStatus
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.ground import (
     find_block_max,
     height_at_cell,
@@ -27,14 +27,14 @@ def scan_rims(model, work, wheel, scope):
             visit the rims and the middle circle.
 
     Returns:
-        The worst ContactStatus of the samples; and the nearest one: its gap [m], infinite if there
+        The worst PoseStatus of the samples; and the nearest one: its gap [m], infinite if there
         is none, its circle (0 right rim, 1 middle, 2 left rim), and its row.
     """
     if scope == SearchScope.COARSE:
         return scan_carefully(model, work, wheel, scope)
     rear, front = find_tops(model, work, wheel)
     if rear < np.inf and front < np.inf:
-        return ContactStatus.IN_CONTACT, _scan_inside(model, work, wheel, (rear, front))
+        return PoseStatus.SETTLED, _scan_inside(model, work, wheel, (rear, front))
     return scan_carefully(model, work, wheel, scope)
 
 
@@ -132,7 +132,7 @@ def scan_carefully(model, work, wheel, scope):
     if scope == SearchScope.COARSE:
         first, last, stride = 1, 1, 2
     middle = samples.rows // 2
-    status, best, best_rim, best_row = ContactStatus.IN_CONTACT, np.inf, first, middle
+    status, best, best_rim, best_row = PoseStatus.SETTLED, np.inf, first, middle
     for visit in range((samples.rows - 1) // stride + 1):
         k = middle + stride * ((visit + 1) // 2) * (1 - 2 * (visit % 2))
         turn = samples.sines[k], samples.cosines[k]
@@ -142,9 +142,9 @@ def scan_carefully(model, work, wheel, scope):
             if gap < best:
                 best, best_rim, best_row = gap, rim, k
             elif gap != gap and not is_cell_on_map(model.ground, gx, gy):
-                status = ContactStatus.OFF_MAP
-            elif gap != gap and status == ContactStatus.IN_CONTACT:
-                status = ContactStatus.UNKNOWN_GROUND
+                status = PoseStatus.OFF_MAP
+            elif gap != gap and status == PoseStatus.SETTLED:
+                status = PoseStatus.UNKNOWN_GROUND
     return status, (best, best_rim, best_row)
 
 

@@ -13,8 +13,6 @@ bracketing finds it whatever the shape of the ground. The wheels are closed in t
 lift shifts the other wheels sideways.
 """
 
-from enum import IntEnum
-
 import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
@@ -22,7 +20,7 @@ from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import difference, solve_in_place
 from rover_physics.rover.linkage import place, rocker_sign
-from rover_physics.status import ContactStatus, PoseStatus
+from rover_physics.status import PoseStatus
 
 GAP_TOLERANCE = 3e-4
 """Largest gap in a settled pose [wheel radii], checked by a final search."""
@@ -55,15 +53,6 @@ MAX_TURN = 0.3
 """Largest change of an angle in one trial [rad]."""
 
 
-class GroundSlope(IntEnum):
-    """Slope of the ground that the derivatives of the gaps assume."""
-
-    LEVEL = 0
-    """Level ground under each wheel."""
-    SLOPED = 1
-    """The slope at the contact."""
-
-
 @kernel
 def settle(model, work):
     """Settle the rover at `work.pose`: write `work.q`, its placement and its contacts.
@@ -85,16 +74,16 @@ def settle(model, work):
     place(model.linkage, work.pose, work.q, work.placement)
     status, worst = _find_contacts(model, work, SearchScope.COARSE)
     if np.isnan(worst):
-        return _refuse(status)
+        return status
     _lower_to_ground(work)
-    if find_step(model.linkage, work, GroundSlope.LEVEL):
+    if find_step(model.linkage, work, sloped=False):
         share = limit_step(work.step, MAX_STEP)
         for i in range(6):
             work.q[i] -= share * work.step[i, 0]
     place(model.linkage, work.pose, work.q, work.placement)
     status, worst = _find_contacts(model, work, SearchScope.QUICK)
-    if status != ContactStatus.IN_CONTACT:
-        return _refuse(status)
+    if status != PoseStatus.SETTLED:
+        return status
     worst, tolerance = np.inf, GAP_TOLERANCE * model.samples.radius
     for _ in range(QUICK_ATTEMPTS):
         before = worst
@@ -102,7 +91,7 @@ def settle(model, work):
         status, worst = _find_contacts(model, work, SearchScope.FULL)
         if worst <= tolerance or np.isnan(worst) or worst > PROMISING * before:
             break
-    if status == ContactStatus.IN_CONTACT and worst > tolerance:
+    if status == PoseStatus.SETTLED and worst > tolerance:
         for i in range(6):
             work.unsettled[i] = work.q[i]
         for attempt in range(RECOVERY_ATTEMPTS):
@@ -113,10 +102,10 @@ def settle(model, work):
                 place(model.linkage, work.pose, work.q, work.placement)
             status, worst = _recover(model, work, attempt != 2)
             stands = worst <= tolerance and not _has_turned_over(work.q)
-            if status == ContactStatus.IN_CONTACT and stands:
+            if status == PoseStatus.SETTLED and stands:
                 break
-    if status != ContactStatus.IN_CONTACT:
-        return _refuse(status)
+    if status != PoseStatus.SETTLED:
+        return status
     if not worst <= tolerance or _has_turned_over(work.q):
         return PoseStatus.NOT_SETTLED
     for wheel in range(6):
@@ -134,7 +123,7 @@ def _recover(model, work, together):
         together: As for `_close_gaps`.
 
     Returns:
-        The worst ContactStatus, and the largest absolute gap [m]; infinite if the rover turns
+        The worst PoseStatus, and the largest absolute gap [m]; infinite if the rover turns
         over.
     """
     tolerance = GAP_TOLERANCE * model.samples.radius
@@ -142,7 +131,7 @@ def _recover(model, work, together):
     for _ in range(RECOVERIES):
         _close_gaps(model, work, worst, together)
         if _has_turned_over(work.q):
-            return ContactStatus.IN_CONTACT, np.inf
+            return PoseStatus.SETTLED, np.inf
         status, worst = _find_contacts(model, work, SearchScope.WHOLE)
         for _ in range(FINAL_ATTEMPTS):
             if worst <= tolerance or np.isnan(worst):
@@ -165,7 +154,7 @@ def _close_gaps(model, work, worst, together):
             together; else each starts where the one before has ended.
     """
     start, q = work.start, work.q
-    write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.LEVEL, work.J)
+    write_gap_rates(model.linkage, work.placement, work.contacts, work.J, sloped=False)
     work.lifts[:, :] = 0.0
     for wheel in range(6):
         work.lifts[wheel, wheel] = 1.0
@@ -250,21 +239,13 @@ def _lift_to(model, work, wheel, lift):
 
 
 @kernel
-def _refuse(status):
-    """Return the PoseStatus of a pose with a wheel off the map or over unknown ground."""
-    if status == ContactStatus.OFF_MAP:
-        return PoseStatus.OFF_MAP
-    return PoseStatus.UNKNOWN_GROUND
-
-
-@kernel
 def _find_contacts(model, work, scope):
-    """Write all contacts; return the worst ContactStatus and the largest absolute gap [m]."""
+    """Write all contacts; return the worst PoseStatus and the largest absolute gap [m]."""
     worst = 0.0
-    status = ContactStatus.IN_CONTACT
+    status = PoseStatus.SETTLED
     for wheel in range(6):
         of_wheel = find_contact(model, work, wheel, scope)
-        if of_wheel == ContactStatus.OFF_MAP or status == ContactStatus.IN_CONTACT:
+        if of_wheel == PoseStatus.OFF_MAP or status == PoseStatus.SETTLED:
             status = of_wheel
         gap = abs(work.contacts.gap[wheel])
         if gap > worst or gap != gap:
@@ -284,7 +265,7 @@ def _newton(model, work):
     for _ in range(MAX_NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE * model.samples.radius or np.isnan(worst):
             return
-        if not find_step(model.linkage, work, GroundSlope.SLOPED):
+        if not find_step(model.linkage, work, sloped=True):
             return
         fraction = limit_step(step, MAX_STEP)
         improved = np.inf
@@ -330,24 +311,24 @@ def limit_step(step, most):
 
 
 @kernel
-def find_step(linkage, work, ground_is):
-    """Solve J step = gaps; `ground_is` is a GroundSlope. Return False if J is singular."""
-    write_gap_rates(linkage, work.placement, work.contacts, ground_is, work.J)
+def find_step(linkage, work, sloped):
+    """Solve J step = gaps; `sloped` is as for `write_gap_rates`. Return False if J is singular."""
+    write_gap_rates(linkage, work.placement, work.contacts, work.J, sloped)
     for i in range(6):
         work.step[i, 0] = work.contacts.gap[i]
     return solve_in_place(work.J, work.step, 6, 1)
 
 
 @kernel
-def write_gap_rates(linkage, placement, contacts, ground_is, J):
+def write_gap_rates(linkage, placement, contacts, J, sloped):
     """Write the derivatives of the gaps by q into J (6, 6) [m/m or m/rad].
 
     Args:
         linkage: LINKAGE.
         placement: PLACEMENT at q.
         contacts: CONTACTS with points and normals.
-        ground_is: A GroundSlope.
         J: (6, 6), row per wheel, column per element of q; written.
+        sloped: Whether the ground has the slope at the contact, else it is level.
     """
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
@@ -359,7 +340,7 @@ def write_gap_rates(linkage, placement, contacts, ground_is, J):
     slope = 0.0, 0.0
     for i in range(6):
         side = i // 3
-        if ground_is == GroundSlope.SLOPED:
+        if sloped:
             slope = normal[i, 0], normal[i, 1]
         arm = difference(point[i], origin)
         J[i, 0] = 1.0

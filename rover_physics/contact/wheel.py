@@ -16,7 +16,7 @@ from rover_physics.contact.contact_record import SearchScope, write_point
 from rover_physics.contact.rim_scan import find_tops, scan_carefully, scan_rims
 from rover_physics.contact.tracking import follow_contact, keep_contact, look_at_kept
 from rover_physics.numerics.kernels import kernel
-from rover_physics.status import ContactStatus
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.ground import height_inside, to_cells
 
 COMPLIANCE = 2e-3
@@ -44,10 +44,10 @@ def find_contact(model, work, wheel, scope):
         scope: A SearchScope.
 
     Returns:
-        The worst ContactStatus of the ground below the wheel.
+        The worst PoseStatus of the ground below the wheel.
     """
     contacts = work.contacts
-    status = ContactStatus.IN_CONTACT
+    status = PoseStatus.SETTLED
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
         _hold(work, wheel)
         return status
@@ -73,7 +73,7 @@ def find_contact(model, work, wheel, scope):
         if scope == SearchScope.FULL and not (rear < np.inf and front < np.inf):
             status = scan_carefully(model, work, wheel, scope)[0]
         below = look_everywhere(model, work, wheel, (rear, front))
-        if status == ContactStatus.IN_CONTACT:
+        if status == PoseStatus.SETTLED:
             status = below
     _write_contact(work, wheel, model.samples)
     return status

@@ -38,16 +38,21 @@ def find_config(relative: str) -> Path:
     )
 
 
-def find_file(what: str, name_or_path: str | Path, presets: Mapping[str, Path]) -> Path:
+def find_file(
+    what: str,
+    name_or_path: str | Path,
+    presets: Mapping[str, Path],
+    kind: type[RoverError] = RoverFileError,
+) -> Path:
     """Return the file of a preset by its name, or the path that is given.
 
     Raises:
-        RoverFileError: Neither a preset nor a file; the text lists the presets of `what`.
+        kind: Neither a preset nor a file; the text lists the presets of `what`.
     """
     if not isinstance(name_or_path, Path) and name_or_path in presets:
         return presets[name_or_path]
     if not os.path.exists(name_or_path):
-        raise RoverFileError(
+        raise kind(
             f"no {what} {show_file(name_or_path)!r}: there is no such file, and the presets are "
             f"{', '.join(presets)}"
         )

@@ -195,7 +195,7 @@ LIMITS: tuple[Limit, ...] = (
     Limit(
         "friction", "speed_share", "a wheel is wedged between faces in front and behind",
         "friction", lambda rover: MIN_SPEED_SHARE, Sense.LEAST, has_number=False,
-        only_if=("stalls", Stall.WEDGED), wheel_of="friction_utilisation", **ON_SERVOS,
+        only_if=("stalls", Stall.WEDGED), wheel_of="friction_utilisation", **FORCES,
     ),
     Limit(
         "friction", "speed_share", "no forward speed balances: the wheels slide", "friction",
@@ -238,8 +238,3 @@ LIMITS: tuple[Limit, ...] = (
     ),
 )  # fmt: skip
 """All limits, in the order in which they become the reason of a row."""
-
-
-def optional_keys() -> tuple[str, ...]:
-    """Return the keys below `limits:` of a rover file that rows of the table read."""
-    return tuple(limit.key for limit in LIMITS if limit.key)

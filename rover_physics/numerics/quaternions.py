@@ -18,11 +18,6 @@ Quaternion = Sequence[float] | Floats
 """Four numbers, in the order that the function's name states."""
 
 
-def length_of(quaternion: Quaternion) -> float:
-    """Return the length of a quaternion; it never overflows, and is NaN or inf as its elements."""
-    return math.hypot(*quaternion)
-
-
 def xyzw_from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Floats:
     """Return quaternions x, y, z, w (..., 4) of rolls, pitches and yaws (...) [rad]."""
     halves = [np.asarray(angle, dtype=np.float64) / 2.0 for angle in (roll, pitch, yaw)]

@@ -138,7 +138,7 @@ def _halve(model: PackedModel, known: Crossings, searched: Searched) -> Crossing
         more = numbers[Progress.ROWS] - len(found.place) + POSES_IN_STRETCH * stretches + 2
         found = join_crossings([found, _unasked(more)])
         rows = len(found.place)
-        ends, closed = (_lengthen(array, rows) for array in (ends, closed))
+        ends, closed = (np.resize(pairs, (rows, 2)) for pairs in (ends, closed))
         asked = Stretches(ends, found.place, found.waypoint, closed, numbers, *searched)
         written, motions = (found.results, numbers_of(found.results)), np.empty((rows, 3))
         places = found.poses, motions, NONE_HELD
@@ -159,13 +159,6 @@ def _unasked(count: int) -> Crossings:
         np.empty(count), np.zeros(count, np.int64), none_held(count),
         np.empty((count, 3)), new_results(count),
     )  # fmt: skip
-
-
-def _lengthen(array: NDArray[np.int64], rows: int) -> NDArray[np.int64]:
-    """Return an array with so many rows; the new ones are to be written."""
-    longer = np.empty((rows, *array.shape[1:]), array.dtype)
-    longer[: len(array)] = array
-    return longer
 
 
 def list_jumps(

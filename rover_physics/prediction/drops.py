@@ -65,15 +65,14 @@ def find_drops(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Cross
         crossings: Poses between the waypoints.
     """
     path = view_read_only(poses), view_read_only(results)
-    return Drops(*_find_drops(wheels, *path, crossings.views))
+    order = crossings.order_among(len(poses))
+    return Drops(*_find_drops(wheels, *path, crossings.views, order))
 
 
 @allocating_kernel
-def _find_drops(wheels, poses, results, between):
-    """Return the fields of `Drops`; `wheels` are Wheels, `between` Crossings."""
+def _find_drops(wheels, poses, results, between, order):
+    """Return the fields of `Drops`; `order` is that of `order_among`, of `between` Crossings."""
     n, m = len(poses), len(between.place)
-    order = np.empty(n + m, np.int64)
-    _merge(n, between.place, order)
     steps = np.zeros(n + m)
     height, rolling_off_edge = np.empty((n + m, 6)), np.zeros((n + m, 6), np.bool_)
     angle, last = np.empty((n + m, 6)), poses[0]
@@ -82,18 +81,16 @@ def _find_drops(wheels, poses, results, between):
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
         steps[k] = distance_between(last, here, wheels.swing_radius)
+        lowest, last = 0.0, here
         for wheel in range(6):
             angle[k, wheel] = angle_ahead(result, wheel)
             height[k, wheel] = result.wheel_centres[wheel, 2]
-        last = here
-    for k in range(n + m):
-        i = order[k]
-        lowest = 0.0
-        for wheel in range(6):
             lowest = min(lowest, angle[k, wheel])
         if lowest < -MIN_ANGLE:
-            result = results[i] if i < n else between.results[i - n]
-            _find_rolling_off_edge(result, wheels, rolling_off_edge[k])
+            some, on_edges = may_roll_off_edge(result, wheels)
+            for wheel in range(6):
+                rolls = some and _rolls_off_edge(result, wheels, wheel, on_edges)
+                rolling_off_edge[k, wheel] = rolls
     first_open = _clear_open_runs(rolling_off_edge)
     _clear_slides(height, angle, wheels.drop_limit, rolling_off_edge)
     descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
@@ -128,27 +125,6 @@ def _is_held(result, wheels, wheel):
         and result.friction_utilisation[wheel] <= friction
         and result.torque_saturation[wheel] <= torque
     )
-
-
-@exact_kernel
-def _merge(n, place, order):
-    """Write the rows in path order into `order`: waypoint i as i, the i-th place as n + i."""
-    i = 0
-    for k in range(n + place.size):
-        waypoint = k - i
-        if i < place.size and (waypoint == n or place[i] < waypoint):
-            order[k] = n + i
-            i += 1
-        else:
-            order[k] = waypoint
-
-
-@exact_kernel
-def _find_rolling_off_edge(result, wheels, rolling_off_edge):
-    """Write (6,) True for wheels that may roll off an edge."""
-    some, on_edges = may_roll_off_edge(result, wheels)
-    for wheel in range(6):
-        rolling_off_edge[wheel] = some and _rolls_off_edge(result, wheels, wheel, on_edges)
 
 
 @exact_kernel

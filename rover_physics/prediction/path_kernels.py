@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats, view_read_only
 from rover_physics.numerics.kernels import exact_kernel
@@ -98,6 +99,10 @@ class Crossings(NamedTuple):
     def in_order(self) -> "Crossings":
         """Return the poses in path order; at a waypoint, the stretch that ends there is first."""
         return self.select(np.lexsort((self.waypoint, self.place)))
+
+    def order_among(self, waypoints: int) -> NDArray[np.int64]:
+        """Return rows in path order: a waypoint as its index, pose j of these as waypoints + j."""
+        return np.append(np.arange(waypoints), self.place).argsort(kind="stable")
 
     def between(self, first: int, end: int, start: int = 0) -> "Crossings":
         """Return the poses from waypoint `first` up to `end`, counted from `start` on."""
@@ -248,14 +253,12 @@ def _decides(here, there, wheels):
 
 @exact_kernel
 def _finest(here, there, wheels):
-    """Return the spacing [m] for a stretch in which a limit may be passed, else inf.
+    """Return the spacing [m] for a stretch in which a limit may be passed, else inf; both settle.
 
     Forces change as contacts turn, and may peak while they do. Where they are beyond at one of the
     poses, a wheel may fall there; until it does, they count. Where a fall begins or ends between
     the poses, its place counts.
     """
-    if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
-        return np.inf
     turn, passes_edge = 0.0, False
     for wheel in range(6):
         angle, other = here.contact_angle[wheel], there.contact_angle[wheel]
@@ -316,7 +319,7 @@ def add_up(poses, results, wheels, start, sums):
             distance += step
             time += max(duration, _largest_change(before, result) / wheels.steering_rate)
             if both:
-                energy += _work(before, result, here[2], turn, wheels)
+                energy += _work(before, result, here[2], turn, duration, wheels)
         sums[0, i] = distance
         sums[1, i] = time if settled else np.nan
         sums[2, i] = energy if settled else np.nan
@@ -352,7 +355,7 @@ def _largest_change(before, after):
 
 
 @exact_kernel
-def _work(before, after, yaw, turn, wheels):
+def _work(before, after, yaw, turn, duration, wheels):
     """Return the energy [J] of the wheels that drive from a RESULT to the next, both settled.
 
     A motor turns its wheel against the link that carries it, and the links turn, too.
@@ -362,6 +365,7 @@ def _work(before, after, yaw, turn, wheels):
         after: RESULT with the motion of the step.
         yaw: Yaw before the step [rad].
         turn: Turn on it [rad].
+        duration: Its time [s].
         wheels: Wheels.
     """
     roll, pitch = 0.5 * (before.q[1] + after.q[1]), 0.5 * (before.q[2] + after.q[2])
@@ -383,9 +387,14 @@ def _work(before, after, yaw, turn, wheels):
         joints = _link_angle(after, wheel, wheels) - _link_angle(before, wheel, wheels)
         swing = np.cos(steering) * (about_y + joints) - np.sin(steering) * about_x
         spin = max(way / wheels.radius - direction * swing, 0.0)
+        # A wheel about which the rover turns may slip as good as wholly; servos turn none faster
+        # than told.
+        fastest = abs(rate) if wheels.on_servos else wheels.max_rate
+        most = max(spin, fastest * duration)
         for result in (before, after):
-            slip = min(result.slip_ratio[wheel], 1.0 - abs(rate) / wheels.max_rate)
-            energy += 0.5 * max(direction * result.torque[wheel], 0.0) * spin / (1.0 - slip)
+            slip = result.slip_ratio[wheel]
+            spun = min(spin / (1.0 - slip), most) if slip < 1.0 else most
+            energy += 0.5 * max(direction * result.torque[wheel], 0.0) * spun
     return energy
 
 
@@ -405,34 +414,23 @@ def _speed_share(result):
 
 
 @exact_kernel
-def find_remaining_jumps(path, between, wheels, ends):
+def find_remaining_jumps(path, order, waypoints, wheels, ends):
     """Find the neighbours on a path whose contacts jump at one place; return their number.
 
     Args:
-        path: Crossings of the waypoints.
-        between: Crossings in between, no wheel held.
+        path: Crossings of the waypoints, then those in between, no wheel held.
+        order: (n,) its rows in path order.
+        waypoints: Number of waypoints.
         wheels: Wheels.
-        ends: (>= n + m, 2) pairs of neighbours, written: waypoint i as i, pose j in between as
-            n + j.
+        ends: (>= n, 2) pairs of neighbours, written.
     """
-    n, m = path.place.size, between.place.size
-    count, last, j = 0, 0, 0
-    for k in range(1, n + m):
-        waypoint = k - j
-        if j < m and between.place[j] < waypoint:
-            here = n + j
-            j += 1
-        else:
-            here = waypoint
-        a = path.results[last] if last < n else between.results[last - n]
-        b = path.results[here] if here < n else between.results[here - n]
-        if jumps_between(a, b, wheels):
-            apart = 0.0
-            if last < n and here < n:
-                apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
-            searched = last >= n or here >= n or apart > 0.0
-            if searched and apart <= LONGEST_STEP * wheels.radius:
-                ends[count, 0], ends[count, 1] = last, here
-                count += 1
-        last = here
+    count = 0
+    for k in range(1, order.size):
+        last, here = order[k - 1], order[k]
+        if not jumps_between(path.results[last], path.results[here], wheels):
+            continue
+        apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
+        if max(last, here) >= waypoints or 0.0 < apart <= LONGEST_STEP * wheels.radius:
+            ends[count, 0], ends[count, 1] = last, here
+            count += 1
     return count

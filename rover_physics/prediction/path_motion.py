@@ -13,8 +13,6 @@ driven, and the wheels point ahead. If no more than half the steps can be driven
 taken one by one, all with their wheels ahead.
 """
 
-from enum import IntEnum
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -41,17 +39,6 @@ COLLINEAR = 1e-6
 """Angle between two steps [rad] up to which they are on one straight line."""
 STRAIGHT = 1e-6
 """Curvature [rad per wheelbase] up to which a step is straight."""
-
-
-class StepKind(IntEnum):
-    """Kind of the step from a waypoint to the next."""
-
-    RESTS = 0
-    """Both are the same pose."""
-    DRIVEN = 1
-    """An arc, a turn on the spot or a sideways motion."""
-    OPEN = 2
-    """No motion of the wheels leads from one to the other."""
 
 
 def motions_of(
@@ -123,11 +110,11 @@ def write_path_motions(models, poses, motions):
         if i > end:
             end = _end_of_line(poses, i)
             is_ahead = _is_line_ahead(poses[i - 1], poses[end])
-        step = _find_motion(linkage, poses[i - 1], poses[i], is_ahead, motions[i])
-        if step == StepKind.DRIVEN:
-            driven += 1
-        elif step == StepKind.OPEN:
+        _find_motion(linkage, poses[i - 1], poses[i], is_ahead, motions[i])
+        if _is_open(motions[i]):
             open_steps += 1
+        elif motions[i, 0] == motions[i, 0]:
+            driven += 1
     first = 0  # first waypoint that a motion leads to
     for i in range(1, n):
         motion = motions[i]
@@ -135,8 +122,7 @@ def write_path_motions(models, poses, motions):
             if first > 0:
                 _copy(motions[i - 1], motion)
             continue
-        is_open = motion[0] == 0.0 and motion[1] == 0.0 and motion[2] == 0.0
-        if is_open or driven <= open_steps:
+        if _is_open(motion) or driven <= open_steps:
             motion[0], motion[1], motion[2] = settings.direction, 0.0, 0.0
         _take_nominal_speed(linkage, settings, motion)
         if first == 0:
@@ -148,6 +134,12 @@ def write_path_motions(models, poses, motions):
             _copy(motions[0], motions[i])
     for i in range(first):
         _copy(motions[first], motions[i])
+
+
+@kernel
+def _is_open(motion):
+    """Return whether a step has no motion: none of the wheels leads from its start to its end."""
+    return motion[0] == 0.0 and motion[1] == 0.0 and motion[2] == 0.0
 
 
 @kernel
@@ -185,7 +177,7 @@ def _is_line_ahead(here, there):
 
 @kernel
 def _find_motion(linkage, here, there, is_ahead, motion):
-    """Write the motion of a step, of any speed: NaN at rest, zeros if open; return a StepKind.
+    """Write the motion of a step, of any speed: NaN at rest, zeros if it is open.
 
     `is_ahead` tells whether the line that the step is on leads ahead or back as a whole.
     """
@@ -195,12 +187,12 @@ def _find_motion(linkage, here, there, is_ahead, motion):
     motion[0] = motion[1] = motion[2] = 0.0
     if max(length, swing) <= AT_REST * linkage.length:
         motion[0] = np.nan
-        return StepKind.RESTS
+        return
     if length <= ON_THE_SPOT * swing:
         motion[2] = 1.0 if turn > 0.0 else -1.0
-        return StepKind.DRIVEN
+        return
     if length > LONGEST * linkage.length:
-        return StepKind.OPEN
+        return
     if linkage.length * abs(turn) <= STRAIGHT * length:
         turn = 0.0
     yaw = here[2] + 0.5 * turn
@@ -209,11 +201,8 @@ def _find_motion(linkage, here, there, is_ahead, motion):
     rate = turn / (length * bulge(turn))
     if abs(turn) <= MAX_TURN and (is_ahead or _swings_out(linkage, (ahead, aside, rate), turn)):
         motion[0], motion[2] = (1.0 if ahead >= 0.0 else -1.0), rate
-        return StepKind.DRIVEN
-    if abs(turn) <= CRAB_TURN and length <= LONGEST_CRAB * linkage.length:
+    elif abs(turn) <= CRAB_TURN and length <= LONGEST_CRAB * linkage.length:
         motion[0], motion[1], motion[2] = ahead, aside, rate
-        return StepKind.DRIVEN
-    return StepKind.OPEN
 
 
 @kernel

@@ -35,11 +35,8 @@ from rover_physics.prediction.path_kernels import (
     none_held,
 )
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.servo_path import (
-    climb_costs,
-    drift_window,
-    write_servo_path,
-)
+from rover_physics.prediction.servo_path import climb_costs, write_servo_path
+from rover_physics.prediction.slots import stop_in_slots
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import (
     join_results,
@@ -68,8 +65,6 @@ NO_SUMS = (0.0, 0.0, 0.0)
 class SweptPath:
     """A prediction along a path with the poses between its waypoints."""
 
-    path: np.ndarray
-    """(k, 3) all poses that were swept; the rest is about the first n of them."""
     prediction: PathPrediction
     """The prediction."""
     crossings: Crossings
@@ -78,20 +73,19 @@ class SweptPath:
     def cut(self, waypoints: int) -> "SweptPath":
         """Return what is about the first waypoints."""
         crossings = self.crossings.select(self.crossings.waypoint < waypoints)
-        return SweptPath(self.path, self.prediction.cut(waypoints), crossings)
+        return SweptPath(self.prediction.cut(waypoints), crossings)
 
 
 @dataclass(frozen=True, eq=False)
 class PathPart:
     """The prediction of consecutive waypoints of a path, as that of the whole path has them."""
 
-    first: int
-    """Index of the first waypoint that no earlier part has."""
+    start: int
+    """Index of its first waypoint; those of the prediction count from there."""
     context: int
-    """Number of waypoints at the beginning of the prediction that earlier parts have."""
+    """Number of waypoints at its beginning that earlier parts have."""
     prediction: PathPrediction
-    """The waypoints from `first - context` on, with `between`. Its indices of waypoints count from
-    there."""
+    """The prediction, with `between`."""
 
 
 def predict_paths(
@@ -143,7 +137,7 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
         swept, drops = make_prediction(model, here, results, crossings, sums)
         decided = end - start if end == len(path) else drops.decided
         if start + decided > done:
-            yield PathPart(done, done - start, swept.prediction.cut(decided))
+            yield PathPart(start, done - start, swept.prediction.cut(decided))
             done = start + decided
         restart = _find_restart(model, here, drops)
         if restart:
@@ -161,7 +155,7 @@ def _find_restart(model: PackedModel, poses: np.ndarray, drops: Drops) -> int:
     if model.wheels.on_servos:
         way = np.append(0.0, np.cumsum(distances_between(model.wheels, poses)))
         last = way[min(drops.decided, len(way) - 1)]
-        starts = starts[way[starts] <= last - drift_window(model)]
+        starts = starts[way[starts] <= last - model.rover.wheelbase]
     return int(starts[-1]) if len(starts) else 0
 
 
@@ -205,18 +199,18 @@ def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> 
         is that of the way in.
     """
     first, end = waypoints.start, waypoints.stop
-    n, wheels = end - first, model.wheels
+    n = end - first
     poses = np.ascontiguousarray(swept.prediction.poses[first:end][::-1])
     results = _reverse(select_results(swept.prediction.results, np.arange(first, end)[::-1]))
     crossings = swept.crossings.select(~swept.crossings.climbing).between(first, end - 1)
     crossings = crossings.reversed(n)
     _reverse(crossings.results)
     path = Crossings(np.arange(float(n)), np.arange(n) + 1, none_held(n), poses, results)
-    pairs = np.empty((n + len(crossings.place), 2), np.int64)
-    count = find_remaining_jumps(path.views, crossings.views, wheels, pairs)
+    path, order = join_crossings([path, crossings]), crossings.order_among(n)
+    pairs = np.empty((len(order), 2), np.int64)
+    count = find_remaining_jumps(path.views, order, n, model.wheels, pairs)
     if count:
-        ends = join_crossings([path, crossings]).select(pairs[:count].ravel())
-        climbs = climb_faces(model, ends, np.arange(2 * count).reshape(-1, 2))
+        climbs = climb_faces(model, path, pairs[:count])
         crossings = join_crossings([crossings, climbs]).in_order()
     return make_prediction(model, poses, results, crossings)[0].prediction
 
@@ -368,6 +362,8 @@ def make_prediction(
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
         write_servo_path(model, poses, results, crossings)
+    else:
+        stop_in_slots(results, crossings)
     between = crossings.results
     results["wheel_drop"] = drops.heights
     results["falling"], between["falling"] = drops.at_waypoints, drops.between
@@ -379,7 +375,7 @@ def make_prediction(
         results["energy"] += energy
     at_crossings = _collect(model, crossings.poses, between, crossings.waypoint)
     prediction = _collect(model, poses, results, np.arange(len(poses)), at_crossings)
-    return SweptPath(poses, prediction, crossings), drops
+    return SweptPath(prediction, crossings), drops
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:

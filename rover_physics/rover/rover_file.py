@@ -12,7 +12,7 @@ from rover_physics.files.config_files import find_config, find_file
 from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of, read_as, refuse
 from rover_physics.files.yaml_file import read_yaml
-from rover_physics.limits.table import optional_keys
+from rover_physics.limits import table
 from rover_physics.rover.checks import check_rover
 from rover_physics.rover.model import Rover
 
@@ -59,9 +59,9 @@ def rover_from_dict(data: object, source: str) -> Rover:
 def _take_further_limits(data: object) -> tuple[object, dict[str, float]]:
     """Return the contents without the optional limits of the table, and these."""
     limits = data.get("limits") if isinstance(data, dict) else None
-    keys = [key for key in optional_keys() if isinstance(limits, dict) and key in limits]
-    if not keys or not isinstance(data, dict) or not isinstance(limits, dict):
+    if not isinstance(data, dict) or not isinstance(limits, dict):
         return data, {}
+    keys = [row.key for row in table.LIMITS if row.key and row.key in limits]
     for key in keys:
         if type(limits[key]) not in (int, float) or not math.isfinite(limits[key]):
             raise refuse(f"limits.{key}", limits[key], "a finite number")

@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.errors import TerrainError
+from rover_physics.errors import RoverError, TerrainError
 from rover_physics.files.npz_file import write_npz
 from rover_physics.files.user_file import open_regular_file
 from rover_physics.files.validation import errors_of, show_file
@@ -23,10 +23,8 @@ from rover_physics.terrain.checks import (
     as_soil,
     as_soil_names,
 )
-from rover_physics.terrain.terrain_file import MAX_CELLS, find_terrain_file, read_entries
+from rover_physics.terrain.terrain_file import GRIDS, MAX_CELLS, find_terrain_file, read_entries
 
-LAYERS = ("elevation", "friction", "elevation_std", "soil", "ground_class")
-"""Grids of a terrain, in the order in which they count for a fingerprint."""
 DIGITS = 16
 """Hexadecimal digits of a fingerprint."""
 _EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
@@ -212,10 +210,9 @@ def read_terrain(file: BinaryIO, source: str | Path, max_cells: int = MAX_CELLS)
     Raises:
         TerrainError: As for `load_terrain`.
     """
-    entries = read_entries(file, source, max_cells)
     try:
-        return Terrain(**entries)
-    except TerrainError as error:
+        return Terrain(**read_entries(file, max_cells))
+    except RoverError as error:
         raise TerrainError(f"{show_file(source)}: {error}") from None
 
 
@@ -233,7 +230,7 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: Any) -> None:
     entries: dict[str, Any] = dict(notes)
     entries["resolution"] = np.float64(terrain.resolution)
     entries["origin"] = np.asarray(terrain.origin)
-    for layer in LAYERS:
+    for layer in GRIDS:
         if getattr(terrain, layer) is not None:
             entries[layer] = getattr(terrain, layer)
     if terrain.soil_names:
@@ -249,7 +246,7 @@ def fingerprint(terrain: Terrain) -> str:
     and its values; then the names of the soils. Unknown cells of all kinds of NaN count alike.
     """
     digest = hashlib.sha256(np.array([terrain.resolution, *terrain.origin], "<f8").tobytes())
-    for name in LAYERS:
+    for name in GRIDS:
         layer = getattr(terrain, name)
         if layer is not None:
             digest.update(f"{name} {layer.shape} ".encode())

@@ -9,7 +9,6 @@ import numpy as np
 from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.config_files import find_config, find_file
 from rover_physics.files.npz_file import NUMBERS, NpzReader
-from rover_physics.files.validation import errors_of
 from rover_physics.numerics.arrays import seal_array
 
 MAX_CELLS = 25_000_000
@@ -18,12 +17,12 @@ REQUIRED = ("elevation", "resolution", "origin")
 GRIDS: dict[str, type | None] = {
     "elevation": np.float64,
     "friction": np.float64,
-    "soil": None,
     "elevation_std": np.float64,
+    "soil": None,
     "ground_class": np.float64,
 }
-"""Entries with a value for each cell, and the types they are read as; None keeps that of the
-file."""
+"""Entries with a value for each cell, and the types they are read as; None keeps that of the file.
+A fingerprint counts them in this order."""
 SMALL = {"resolution": 100, "origin": 100, "soil_names": 250_000}
 """Other entries, and the largest numbers of their values or characters."""
 
@@ -43,40 +42,36 @@ def find_terrain_file(name_or_path: str | Path) -> Path:
     Raises:
         TerrainError: Neither a preset nor a file; the text lists the presets.
     """
-    try:
-        return find_file("terrain", name_or_path, terrain_presets())
-    except RoverFileError as error:
-        raise TerrainError(str(error)) from None
+    return find_file("terrain", name_or_path, terrain_presets(), TerrainError)
 
 
-def read_entries(file: BinaryIO, source: str | Path, max_cells: int) -> dict[str, Any]:
+def read_entries(file: BinaryIO, max_cells: int) -> dict[str, Any]:
     """Read the entries of a terrain file.
 
     The size of an entry is checked before it is unpacked.
 
     Args:
         file: The file, open for reading.
-        source: Its name for error texts.
         max_cells: Largest number of cells.
 
     Returns:
         The entries by name, read-only arrays; optional ones may be missing.
 
     Raises:
-        TerrainError: The file is no terrain file, is damaged, or has more cells.
+        RoverFileError: The file is no terrain file, is damaged, or has more cells; the text does
+            not name it.
     """
-    with errors_of(source, TerrainError):
-        archive = NpzReader(file)
-        there = archive.names
-        for name in REQUIRED:
-            if name not in there:
-                raise RoverFileError(
-                    f"no entry {name}; a terrain file has elevation, resolution and origin"
-                )
-        entries = {
-            name: archive.read(name, most=most) for name, most in SMALL.items() if name in there
-        }
-        for name, dtype in GRIDS.items():
-            if name in there:
-                entries[name] = archive.read(name, most=max_cells, kinds=NUMBERS, dtype=dtype)
+    archive = NpzReader(file)
+    there = archive.names
+    for name in REQUIRED:
+        if name not in there:
+            raise RoverFileError(
+                f"no entry {name}; a terrain file has elevation, resolution and origin"
+            )
+    entries = {
+        name: archive.read(name, most=most) for name, most in SMALL.items() if name in there
+    }
+    for name, dtype in GRIDS.items():
+        if name in there:
+            entries[name] = archive.read(name, most=max_cells, kinds=NUMBERS, dtype=dtype)
     return {name: seal_array(values) for name, values in entries.items()}

@@ -8,7 +8,6 @@ best place never has a larger one. The balance is linear: all on the line keep i
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import osqp
@@ -179,27 +178,20 @@ def solve_traction(
         if _search_line(shares, friction, max_pull, (start, aim, x)) <= CONVERGED_SHARE * unit:
             break
     x = x if programs else rows.pull_equally()
-    fallback = programs == 0 < max_programs
-    run = {"iterations": iterations, "programs": programs, "fallback": fallback, "status": status}
-    return _describe_answer(rows, inputs, x, run)
-
-
-def _describe_answer(
-    rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray, run: dict[str, Any]
-) -> TractionAnswer:
-    """Return forces x (14,) in SI units, with what the run of the programs came to."""
     table = np.empty((5, WHEEL_COUNT))
     peak, min_load, max_torque = _measure_wheels(
-        rows.lateral_shares, rows.force_unit, inputs.friction, inputs.max_torque, inputs.radius,
-        x, table,
-    )  # fmt: skip
+        shares, rows.force_unit, friction, inputs.max_torque, inputs.radius, x, table
+    )
     torques, loads, tractions, lateral, utilisation = table
     return TractionAnswer(
         torques, loads, tractions, lateral, utilisation,
         friction_slack=max(peak - 1.0, 0.0),
         load_slack=max(-min_load, 0.0),
         torque_slack=max(max_torque - inputs.max_torque, 0.0),
-        **run,
+        iterations=iterations,
+        programs=programs,
+        fallback=programs == 0 < max_programs,
+        status=status,
     )  # fmt: skip
 
 

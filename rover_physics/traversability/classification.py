@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
-from rover_physics.names import CONTROL_POLICIES, EQUAL, OPTIMAL, SERVO, TORQUE_POLICIES, WHEELS
+from rover_physics.names import CONTROL_POLICIES, EQUAL, TORQUE_POLICIES, WHEELS
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -25,7 +25,7 @@ WITH_SPEED_SERVOS = "passable with speed servos"
 WITH_TRACTION_CONTROL = "passable with traction control"
 IMPASSABLE = "impassable"
 TRAVERSABILITY_CLASSES = (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IMPASSABLE)
-"""The classes, from best to worst."""
+"""The classes, from best to worst: by the first of TORQUE_POLICIES that passes, or none."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def classify_path(
 
     Returns:
         A class per waypoint. A limit broken on the way to a waypoint counts at that waypoint, as
-        does entrapment.
+        does entrapment. Where waypoints need different drives, none may pass the whole path.
 
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
@@ -144,10 +144,6 @@ def deciding_waypoint(classes: Sequence[ClassifiedWaypoint]) -> int:
     return among[int(np.argmin(np.where(np.isnan(margins), np.inf, margins)))]
 
 
-_CLASS_OF = {EQUAL: PASSABLE, SERVO: WITH_SPEED_SERVOS, OPTIMAL: WITH_TRACTION_CONTROL}
-"""Class of a waypoint that is passable under a policy, and under none before it."""
-
-
 def _choose(decisions: Sequence[ClassifiedWaypoint]) -> ClassifiedWaypoint:
     """Return the class of a waypoint from its decisions by policy, in TORQUE_POLICIES order."""
     why_not = ""
@@ -211,7 +207,7 @@ def _decision(
 ) -> ClassifiedWaypoint:
     """Return what decides a waypoint under one policy."""
     name = WHEELS[wheel] if wheel >= 0 else ""
-    found = IMPASSABLE if reason else _CLASS_OF[policy]
+    found = IMPASSABLE if reason else TRAVERSABILITY_CLASSES[TORQUE_POLICIES.index(policy)]
     return ClassifiedWaypoint(found, policy, code, name, margin, reason)
 
 

@@ -64,33 +64,28 @@ class Course:
     distance: np.ndarray
     """(n,) horizontal distance of the judged waypoints since the first [m]."""
     irreversible: np.ndarray
-    """(n,) True where the way back has to be judged, see `find_irreversible`."""
+    """(n,) True where the way back has to be judged, see `_find_irreversible`."""
     drop: np.ndarray
     """(n,) largest drop of a wheel at a waypoint or since the one before [m]."""
     direction: np.ndarray
-    """(n,) 1 where the rover drives forwards, -1 backwards, see `find_directions`."""
+    """(n,) 1 where the rover drives forwards, -1 backwards; on the spot as the options have it."""
     swept: SweptPath | None
     """The sweep of the way in; None if it was not kept."""
 
 
-def course_of(model: PackedModel, swept: SweptPath) -> Course:
-    """Return the course of a path that the model has swept."""
-    prediction = swept.prediction
-    drop = prediction.wheel_drop.max(axis=1)
+def course_of(
+    model: PackedModel, path: np.ndarray, prediction: PathPrediction, swept: SweptPath | None
+) -> Course:
+    """Return the course of what the model predicts of a path (k, 3)."""
+    ahead = prediction.motion[:, 0]
     return Course(
-        swept.path,
+        path,
         prediction.distance,
-        find_irreversible(model, prediction),
-        drop,
-        find_directions(model, prediction),
+        _find_irreversible(model, prediction),
+        prediction.wheel_drop.max(axis=1),
+        np.where(ahead == 0.0, model.options.direction, np.sign(ahead)),
         swept,
     )
-
-
-def find_directions(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
-    """Return (n,) 1 where the rover drives forwards, -1 backwards; on the spot as the options."""
-    ahead = prediction.motion[:, 0]
-    return np.where(ahead == 0.0, model.options.direction, np.sign(ahead))
 
 
 def refuse_if_trapped(model: PackedModel, course: Course, verdict: Verdict) -> Verdict:
@@ -124,7 +119,7 @@ def refuse_if_trapped(model: PackedModel, course: Course, verdict: Verdict) -> V
     return with_refusals(verdict, codes, reasons)
 
 
-def find_irreversible(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
+def _find_irreversible(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
     """Return (n,) True at or just after places where the forces of the way in allow no return.
 
     Under policy "optimal" other torques may allow it; these are only the places to check.
@@ -194,8 +189,7 @@ def _judge_to_failure(model: PackedModel, poses: np.ndarray) -> Verdict:
     for part in predict_in_parts(model, poses):
         verdict = hold_against_limits(model.rover, part.prediction)
         if not verdict.traversable:
-            at = part.first - part.context + verdict.first_failure
-            return replace(verdict, first_failure=at)
+            return replace(verdict, first_failure=part.start + verdict.first_failure)
     return verdict
 
 

@@ -32,8 +32,6 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.entrapment import (
     Course,
     course_of,
-    find_directions,
-    find_irreversible,
     refuse_if_trapped,
 )
 from rover_physics.traversability.verdict import (
@@ -76,11 +74,12 @@ def judge_path(
             takes the map as exact.
         stop_at_failure: Whether to leave out the waypoints beyond the first failure (default: all
             waypoints are predicted and judged). It saves their time and changes neither whether
-            the path is traversable nor code, reason and waypoint of the first failure.
+            the path is traversable nor code, reason and waypoint of the first failure, unless
+            the code is `chance`.
         accepted_chance: Largest chance of failure, 0 to 1, of a path that is traversable; the
             verdict then has the chance, except of a path that stopped at its first failure
             (docs/uncertainty.md); with `stop_at_failure`, one above the accepted chance may be
-            larger than told. None does not ask for it.
+            larger than told, and most at another waypoint. None does not ask for it.
         chance_of_refused: Whether to ask for it on a path that is refused without it, too.
         known: What this rover with these options has found on this ground so far; grows. It saves
             time and changes nothing else.
@@ -149,11 +148,13 @@ def judge_paths(
     model = pack_model(rover, terrain, options).remember(known)
     checked = [check_poses(poses) for poses in paths]
     judged, of_refused = [], chance_of_refused and not stop_at_failure
-    for swept in predict_paths(model, checked, stop_at_failure):
+    paths_swept = predict_paths(model, checked, stop_at_failure)
+    for poses, swept in zip(checked, paths_swept, strict=True):
         check_interruption()
         verdict = hold_against_limits(rover, swept.prediction)
         if check_entrapment and verdict.code != "wheel_drop":
-            verdict = refuse_if_trapped(model, course_of(model, swept), verdict)
+            course = course_of(model, poses, swept.prediction, swept)
+            verdict = refuse_if_trapped(model, course, verdict)
         prediction, verdict = add_bounds(model, swept.prediction, verdict, sigmas)
         if accepted_chance is not None and (verdict.traversable or of_refused):
             enough = accepted_chance if stop_at_failure else 1.0
@@ -202,7 +203,7 @@ def judge_poses(
     motions = motions_of(model, places, np.zeros(len(places)) if curvature is None else curvature)
     prediction, verdict = _judge_in_motion(model, places, motions, sigmas)
     if accepted_chance is not None:
-        swept = SweptPath(places, prediction, NO_CROSSINGS)
+        swept = SweptPath(prediction, NO_CROSSINGS)
         chance = find_failure_chance(model, swept, on_path=False)
         verdict = refuse_chance(verdict, chance, accepted_chance)
     return prediction, verdict
@@ -318,15 +319,14 @@ class PartwiseJudge:
         model = self._model
         for part in predict_in_parts(model, self._poses):
             verdict = hold_against_limits(model.rover, part.prediction)
-            irreversible = find_irreversible(model, part.prediction)
+            course = course_of(model, self._poses, part.prediction, None)
             if self._failure[0] < 0 <= verdict.first_failure:
-                waypoint = part.first - part.context + verdict.first_failure
+                waypoint = part.start + verdict.first_failure
                 self._failure = (waypoint, verdict.code, verdict.reason)
             new = slice(part.context, None)
             prediction = part.prediction.select(new)
-            drop = prediction.wheel_drop.max(axis=1)
-            directions = find_directions(model, prediction)
-            self._courses.append((prediction.distance.copy(), irreversible[new], drop, directions))
+            rows = course.distance.copy(), course.irreversible, course.drop, course.direction
+            self._courses.append(tuple(row[new] for row in rows))
             verdict = with_refusals(verdict, verdict.codes[new], verdict.reasons[new])
             yield add_bounds(model, prediction, verdict, self._sigmas)
 

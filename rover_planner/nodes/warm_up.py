@@ -8,7 +8,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
-from rover_physics.warm_up import EXACT, SCORES, SINGLE, UNCERTAIN
+from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.learning.drive_log import FORCES, TIME, WIDTH
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -113,7 +113,7 @@ LEARNING = (feel_ground,)
 SIMULATION = (simulate,)
 """All that the quasi-static simulator needs."""
 GROUPS = (
-    (*EXACT, *SCORES, *SINGLE, *UNCERTAIN, *HAZARDS, *PATH_SEARCH, *SIMULATION),
+    (*EXACT, *UNCERTAIN, *HAZARDS, *PATH_SEARCH, *SIMULATION),
     (search_lattice, *TRACTION, *LEARNING),
 )
 """All kernels. The first group compiles the model of a pose once for all that use it, which takes
