@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
+from rclpy.event_handler import SubscriptionEventCallbacks
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
@@ -142,9 +143,13 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
         hear(String, "~/ground_estimate", self._take_ground, qos)
-        # Only a transient-local one hears of places that were marked before a restart.
-        for profile in (qos, result_qos()):
-            self.create_subscription(String, "~/mark_place", self._take_mark, profile)
+        self.create_subscription(String, "~/mark_place", self._take_mark, qos)
+        # Only a transient-local one hears of places that were marked before a restart. It does not
+        # warn of publishers that the other one hears.
+        quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+        self.create_subscription(
+            String, "~/mark_place", self._take_mark, result_qos(), event_callbacks=quiet
+        )
 
     def _log_ready(self) -> None:
         name, known = self.service.settings.rover.name, self.service.known_map

@@ -2,12 +2,14 @@
 """A traverse server takes what was learned of the ground; its answers say what they assume."""
 
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from rover_planner.ros.guard import EVENT_PERIOD
 from rover_planner.ros.qos import result_qos, topic_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import GOAL, SERVER, START, ask
@@ -34,7 +36,7 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
     assert json.loads(verdict["ground_classes"].replace("'", '"')) == {"7": 0.45}
 
 
-def test_a_marked_place_stays_impassable_until_places_are_cleared(shared):
+def test_a_marked_place_stays_impassable_until_places_are_cleared(shared, capfd):
     server, client = shared.server, shared.client
     sender = client.create_publisher(String, f"{SERVER}/mark_place", topic_qos())
     place = {"x": GOAL[0], "y": GOAL[1], "radius": 0.3, "reason": "dust", "date": "today"}
@@ -45,6 +47,8 @@ def test_a_marked_place_stays_impassable_until_places_are_cleared(shared):
     clearer = client.create_client(Trigger, f"{SERVER}/clear_places")
     assert call(clearer, Trigger.Request()).message == "1 marked places cleared"
     assert client.can_traverse(START, GOAL).poses
+    time.sleep(2.0 * EVENT_PERIOD)
+    assert "New publisher" not in capfd.readouterr().err  # that no message of it will be received
 
 
 def test_a_server_that_starts_anew_knows_the_places_that_were_marked_before(start_server, client):
