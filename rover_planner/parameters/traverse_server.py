@@ -9,8 +9,13 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 
-LEAST_SPACINGS = {"candidate_spacing": 0.01, "waypoint_spacing": 0.001, "plan_spacing": 0.001}
-"""Smallest values other than 0 of the distances along and between paths [m]."""
+LEAST_DISTANCES = {
+    "candidate_spacing": 0.01,
+    "waypoint_spacing": 0.001,
+    "plan_spacing": 0.001,
+    "monitor_offset": 0.01,
+}
+"""Smallest values other than 0 of the distances along, between and from paths [m]."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
 """Values of the parameter unknown_cells."""
 ALLOW, ALLOW_FOOTPRINT = "allow", "allow_footprint"
@@ -268,12 +273,12 @@ class TraverseServerParameters(ParameterTable):
         """Check all values.
 
         Raises:
-            ParameterError: As for all tables, or one of LEAST_SPACINGS is not kept.
+            ParameterError: As for all tables, or one of LEAST_DISTANCES is not kept.
         """
         super().__post_init__()
-        for name, least in LEAST_SPACINGS.items():
-            spacing = getattr(self, name)
-            if 0.0 < spacing < least:
+        for name, least in LEAST_DISTANCES.items():
+            distance = getattr(self, name)
+            if 0.0 < distance < least:
                 raise ParameterError(
-                    f"parameter {name} is {spacing}; it must be 0, or at least {least:g} m"
+                    f"parameter {name} is {distance}; it must be 0, or at least {least:g} m"
                 )
