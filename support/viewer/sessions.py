@@ -163,7 +163,7 @@ def held(session: ViewSession, at: str = "") -> Iterator[None]:
 
     Args:
         session: The session, which asks for the judgement within the context.
-        at: What is held, such as "searching a path"; empty: all.
+        at: What is held, such as "searching for a path"; empty: all.
     """
     find_steps, go_on = session.find_steps, threading.Event()
 

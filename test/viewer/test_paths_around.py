@@ -46,7 +46,7 @@ def test_beyond_a_wall_with_a_gap_a_path_around_is_offered_and_the_path_looked_a
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
     assert shown.around.outcome == FOUND and shown.path is not around and shown.offer == 5
     [offer] = describe_verdict(shown)["offers"]
-    assert offer["words"].startswith("path 6 around passes")
+    assert offer["words"].startswith("path 6 goes around and passes")
     ends = shown.scenario.start[:2], BEYOND
     np.testing.assert_allclose(around.poses[[0, -1], :2], ends, atol=1e-9)
 

@@ -9,7 +9,6 @@ import pytest
 
 from rover_physics.errors import RoverFileError
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.command.prediction_files import read_prediction, write_prediction
@@ -20,6 +19,7 @@ from rover_planner.viewer.documents.paths import describe_changes, describe_path
 from rover_planner.viewer.state.scenario import CANDIDATES, Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
+from support.rovers import M2020
 from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
 
 # What a person looks at, and what it is compared with.
@@ -138,9 +138,20 @@ def test_undo_goes_back_change_by_change_and_never_to_another_rover():
     with pytest.raises(PlanningError, match="no change"):
         session.undo()
     session.change_rover(FRICTION, 0.6)
-    session.take_rover(load_rover("m2020"))
+    session.take_rover(M2020)
     with pytest.raises(PlanningError, match="no change"):
         session.undo()
+
+
+def test_candidates_have_the_distances_of_the_rover_that_was_loaded_last():
+    session = session_on(waves, options=CANDIDATES)
+    own = session.wanted.candidates
+    assert (own.spacing, own.waypoint_spacing) == (0.5, 0.02)
+    session.change_rover([("wheel", "radius")], 0.11)
+    assert session.wanted.candidates == own
+    session.take_rover(M2020)
+    large, radius = session.wanted.candidates, M2020.wheel.radius
+    assert (large.spacing, large.waypoint_spacing) == (5.0 * radius, 0.2 * radius)
 
 
 def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so():

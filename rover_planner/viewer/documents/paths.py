@@ -107,9 +107,9 @@ def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:
     """Return what a click takes instead of a path that is refused: words, and what it asks."""
     if shown.offer is None:
         return []
-    around = "" if shown.offer < shown.generated else " around"
+    around = "" if shown.offer < shown.generated else "goes around and "
     length = shown.paths[shown.offer].length
-    words = f"path {shown.offer + 1}{around} passes ({length:.1f} m)"
+    words = f"path {shown.offer + 1} {around}passes ({length:.1f} m)"
     return [{"words": words, "ask": {"ask": "show", "index": shown.offer}}]
 
 

@@ -21,7 +21,7 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.scenario import JudgedPath, Scenario, Shown
 
 PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
-SEARCH, BETTER = "searching a path", "path found, searching a better one"
+SEARCH, BETTER = "searching for a path", "path found, searching for a better one"
 """Names of steps."""
 Step = Progress | Shown
 """The beginning of a step, or what is known."""
@@ -99,7 +99,7 @@ def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Seque
 def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
     """Judge all candidate paths, or the recorded path, and look at the one that is chosen."""
     if asked.recorded is None:
-        paths = generate_paths(asked.rover, asked.start, asked.goal, asked.options)
+        paths = generate_paths(asked.rover, asked.start, asked.goal, asked.candidates)
     else:
         paths = [asked.recorded]
     judged = []

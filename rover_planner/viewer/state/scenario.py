@@ -52,9 +52,11 @@ class Scenario:
     search: LatticeSettings = field(default_factory=LatticeSettings)
     """Options of the search of a path around obstacles."""
 
-    def __post_init__(self) -> None:
+    @property
+    def candidates(self) -> PathQueryOptions:
+        """Options of the candidates, with lengths of the rover as it was loaded."""
         spacing = self.options.spacing or SPACING * self.loaded.wheel.radius
-        object.__setattr__(self, "options", self.options.change(spacing=spacing))
+        return replace(self.options, spacing=spacing).fit(self.loaded)
 
     @property
     def arm(self) -> dict[str, float]:
