@@ -103,7 +103,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "rover_planner = rover_planner.cli:main",
+            "rover_planner = rover_planner.__main__:main",
             "traverse_server = rover_planner.nodes.start:start_traverse_server",
             "traction_controller = rover_planner.nodes.start:start_traction_controller",
             "mission_planner = rover_planner.nodes.start:start_mission_planner",

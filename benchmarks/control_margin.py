@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives in MuJoCo with traction control, and which of them the planner promises.
 
-Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S]
+Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S] [--calibrate]
 It needs the extra `bench`. Its results are in docs/validation.md.
 """
 
@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from benchmarks.chance import MODEL_STDS
 from benchmarks.drives import BY_MAP, Obstacle, drive, run_in_processes
 from benchmarks.measure import print_table
 from rover_physics import Rover, SweepOptions, judge_path, load_rover
@@ -84,6 +85,17 @@ def find_promises(obstacle: Obstacle) -> tuple[bool, ...]:
     return (*margins, passes(rover, ACCEPTED_CHANCE), passes(known, ACCEPTED_CHANCE))
 
 
+def find_chance(obstacle: Obstacle, model_std: float) -> float:
+    """Return the chance that traction control fails, friction and torque limit known."""
+    rover = unlimited(load_rover("lsr1"))
+    known = replace(rover.uncertainty, **KNOWN, model=model_std)
+    asked = SweepOptions(
+        friction=obstacle.friction, max_torque=obstacle.max_torque, policy=OPTIMAL
+    )
+    path, rover = drive_path(), replace(rover, uncertainty=known)
+    return judge_path(rover, obstacle.ground, path, asked, accepted_chance=1.0)[1].failure_chance
+
+
 def draw_passable(count: int, seed: int) -> dict[Obstacle, tuple[bool, ...]]:
     """Return obstacles that are passable with traction control and not without, with PROMISES."""
     rng, promised = np.random.default_rng(seed), {}
@@ -97,9 +109,24 @@ def draw_passable(count: int, seed: int) -> dict[Obstacle, tuple[bool, ...]]:
                 return promised
 
 
+def calibrate(obstacles: list[Obstacle], passed: np.ndarray) -> None:
+    """Print the scores of model errors on drives (n,)."""
+    jobs = [(obstacle, std) for std in MODEL_STDS for obstacle in obstacles]
+    told = np.reshape(list(run_in_processes(find_chance, jobs)), (len(MODEL_STDS), -1))
+    rows = []
+    for std, chance in zip(MODEL_STDS, told, strict=True):
+        loss = -np.log(np.where(passed, 1.0 - chance, chance).clip(0.005))
+        rows.append((f"{std:g}", ((chance - ~passed) ** 2).mean(), loss.mean()))
+    columns = {"model error": "", "Brier score": ".4f", "log loss": ".4f"}
+    print_table("Calibration, friction and torque known", columns, rows)
+
+
 def main(
     count: Annotated[int, typer.Option(help="Number of obstacles.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of the obstacles.")] = 1,
+    calibrate_too: Annotated[
+        bool, typer.Option("--calibrate", help="Score model errors on these drives.")
+    ] = False,
 ) -> None:
     """Draw, judge and drive; print how many promises are kept, and what of the rest passes."""
     promised = draw_passable(count, seed)
@@ -112,6 +139,8 @@ def main(
     title = f"{count} obstacles that need traction control, contact angles from the map"
     columns = dict.fromkeys(("promised by", "promises kept", "promised of what passes"), "")
     print_table(title, columns, rows)
+    if calibrate_too:
+        calibrate(list(promised), passed)
 
 
 def share(count: int, of: int) -> str:

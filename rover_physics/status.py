@@ -52,7 +52,7 @@ class TorquePolicy(IntEnum):
 
 
 class Stall(IntEnum):
-    """Why no forward speed of a rover on speed servos balances; SLIDING also where one does."""
+    """Why a rover stands, with torque policies that a wheel is wedged; SLIDING where it drives."""
 
     SLIDING = 0
     """The wheels slide."""

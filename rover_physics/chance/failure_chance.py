@@ -49,6 +49,8 @@ SUMS = ("turn_off", "slide_off", "lift_height")
 """Quantities of limits that are sums along the path."""
 OF_PATH = ("falling", "wheel_drop", "drift", "lift_height")
 """Quantities that the path around a pose decides."""
+OF_SLOTS = ("speed_share", "stalls")
+"""Quantities that it decides if wheels are not on speed servos: whether one is wedged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +233,7 @@ def _evaluate(
             found = model.evaluate_variants(variants, poses[here], motions[here], rows.held[here])
             for to, one in zip(results, found.T, strict=True):
                 place_results(np.ascontiguousarray(one), to, here)
-    for name in OF_PATH:
+    for name in OF_PATH if model.wheels.on_servos else (*OF_PATH, *OF_SLOTS):
         results[name] = rows.results[name]
     results["torque_saturation"] /= np.array([[one.torques] for one in group.samples])
     if model.wheels.on_servos:

@@ -195,7 +195,7 @@ LIMITS: tuple[Limit, ...] = (
     Limit(
         "friction", "speed_share", "a wheel is wedged between faces in front and behind",
         "friction", lambda rover: MIN_SPEED_SHARE, Sense.LEAST, has_number=False,
-        only_if=("stalls", Stall.WEDGED), wheel_of="friction_utilisation", **ON_SERVOS,
+        only_if=("stalls", Stall.WEDGED), wheel_of="friction_utilisation", **FORCES,
     ),
     Limit(
         "friction", "speed_share", "no forward speed balances: the wheels slide", "friction",

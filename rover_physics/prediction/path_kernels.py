@@ -319,7 +319,7 @@ def add_up(poses, results, wheels, start, sums):
             distance += step
             time += max(duration, _largest_change(before, result) / wheels.steering_rate)
             if both:
-                energy += _work(before, result, here[2], turn, wheels)
+                energy += _work(before, result, here[2], turn, duration, wheels)
         sums[0, i] = distance
         sums[1, i] = time if settled else np.nan
         sums[2, i] = energy if settled else np.nan
@@ -355,7 +355,7 @@ def _largest_change(before, after):
 
 
 @exact_kernel
-def _work(before, after, yaw, turn, wheels):
+def _work(before, after, yaw, turn, duration, wheels):
     """Return the energy [J] of the wheels that drive from a RESULT to the next, both settled.
 
     A motor turns its wheel against the link that carries it, and the links turn, too.
@@ -365,6 +365,7 @@ def _work(before, after, yaw, turn, wheels):
         after: RESULT with the motion of the step.
         yaw: Yaw before the step [rad].
         turn: Turn on it [rad].
+        duration: Its time [s].
         wheels: Wheels.
     """
     roll, pitch = 0.5 * (before.q[1] + after.q[1]), 0.5 * (before.q[2] + after.q[2])
@@ -386,9 +387,14 @@ def _work(before, after, yaw, turn, wheels):
         joints = _link_angle(after, wheel, wheels) - _link_angle(before, wheel, wheels)
         swing = np.cos(steering) * (about_y + joints) - np.sin(steering) * about_x
         spin = max(way / wheels.radius - direction * swing, 0.0)
+        # A wheel about which the rover turns may slip as good as wholly; servos turn none faster
+        # than told.
+        fastest = abs(rate) if wheels.on_servos else wheels.max_rate
+        most = max(spin, fastest * duration)
         for result in (before, after):
-            slip = min(result.slip_ratio[wheel], 1.0 - abs(rate) / wheels.max_rate)
-            energy += 0.5 * max(direction * result.torque[wheel], 0.0) * spin / (1.0 - slip)
+            slip = result.slip_ratio[wheel]
+            spun = min(spin / (1.0 - slip), most) if slip < 1.0 else most
+            energy += 0.5 * max(direction * result.torque[wheel], 0.0) * spun
     return energy
 
 

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Effects of speed servos that only the whole path shows: lifts, wedged wheels, and drift.
+"""Effects of speed servos that only the whole path shows: lifts, momentum and drift.
 
 A wheel may lift while the others drive the rover on, and touch down again. How high it gets is the
 sum of its speeds of lifting.
 
 Where forces are missing for a few millimetres, the rover's momentum carries it on.
-
-A wheel that falls into a slot as narrow as itself is wedged between its faces. The forces on it
-are not determined there: friction at both faces may lock it, whatever the motors do.
 
 The servos turn the wheels as the path asks, whatever the rover does. A controller that follows the
 path corrects slow errors. What builds up within the length of the rover, the drift, is too fast
@@ -29,19 +26,15 @@ from rover_physics.prediction.path_kernels import (
     Wheels,
     distances_between,
 )
+from rover_physics.prediction.slots import stop_in_slots
 from rover_physics.results.record import select_results
-from rover_physics.status import PoseStatus, Stall
-
-WEDGED = np.radians(140.0)
-"""Angle [rad] between contacts in front of and behind a wheel from which it is wedged. The line
-between them is then within 20 degrees of both normals, less than the friction angle of any ground
-that a rover drives on, so friction at the two faces can hold any force."""
+from rover_physics.status import PoseStatus
 
 
 def write_servo_path(
     model: PackedModel, poses: np.ndarray, results: Any, crossings: Crossings
 ) -> None:
-    """Write what the path decides under policy "servo": speeds, wedged wheels, drift and lifts.
+    """Write what the path decides under policy "servo": speeds, drift and lifts.
 
     Args:
         model: The model.
@@ -51,7 +44,7 @@ def write_servo_path(
     """
     course = _Course(model.wheels, poses, results, crossings)
     _carry_by_momentum(course, float(model.record.linkage.gravity))
-    _stop_in_slots(course)
+    stop_in_slots(results, crossings)
     results["drift"] = _find_drift(course, model.rover.wheelbase)
     _write_lift_heights(course)
 
@@ -80,19 +73,6 @@ class _Course:
         n, unsorted = len(self.results), np.empty_like(values)
         unsorted[self.order] = values
         self.results[name], self.crossings.results[name] = unsorted[:n], unsorted[n:]
-
-
-def _stop_in_slots(course: _Course) -> None:
-    """Set the speed share to 0 where a wheel is wedged."""
-    angles = course.values("contact_angle") * np.sign(course.values("wheel_speed"))
-    # The contact jumps from the face behind to the face in front.
-    wedged = ((angles[1:] - angles[:-1] >= WEDGED) & (angles[:-1] < 0.0)).any(axis=1)
-    if wedged.any():
-        rows = 1 + np.flatnonzero(wedged)
-        for name, value in (("speed_share", 0.0), ("stalls", Stall.WEDGED)):
-            values = course.values(name)
-            values[rows] = value
-            course.write(name, values)
 
 
 def _carry_by_momentum(course: _Course, gravity: float) -> None:

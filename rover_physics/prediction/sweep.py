@@ -36,6 +36,7 @@ from rover_physics.prediction.path_kernels import (
 )
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.servo_path import climb_costs, write_servo_path
+from rover_physics.prediction.slots import stop_in_slots
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import (
     join_results,
@@ -361,6 +362,8 @@ def make_prediction(
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
         write_servo_path(model, poses, results, crossings)
+    else:
+        stop_in_slots(results, crossings)
     between = crossings.results
     results["wheel_drop"] = drops.heights
     results["falling"], between["falling"] = drops.at_waypoints, drops.between

@@ -83,9 +83,9 @@ QUANTITIES = (
     Quantity(
         "speed_share", (), "",
         "share of the commanded motion that the rover makes: 0 where no forward speed balances; "
-        'always 1 under other policies than "servo"',
+        'under other policies than "servo" 1, and 0 where a wheel is wedged',
     ),
-    Quantity("stalls", (), "", "why no forward speed balances, a Stall"),
+    Quantity("stalls", (), "", "why the rover stands, a Stall"),
     Quantity(
         "deficit", (), "",
         "force along the motion that is missing where no forward speed balances, over the weight; "

@@ -71,7 +71,7 @@ def classify_path(
 
     Returns:
         A class per waypoint. A limit broken on the way to a waypoint counts at that waypoint, as
-        does entrapment.
+        does entrapment. Where waypoints need different drives, none may pass the whole path.
 
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.

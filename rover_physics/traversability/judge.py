@@ -74,11 +74,12 @@ def judge_path(
             takes the map as exact.
         stop_at_failure: Whether to leave out the waypoints beyond the first failure (default: all
             waypoints are predicted and judged). It saves their time and changes neither whether
-            the path is traversable nor code, reason and waypoint of the first failure.
+            the path is traversable nor code, reason and waypoint of the first failure, unless
+            the code is `chance`.
         accepted_chance: Largest chance of failure, 0 to 1, of a path that is traversable; the
             verdict then has the chance, except of a path that stopped at its first failure
             (docs/uncertainty.md); with `stop_at_failure`, one above the accepted chance may be
-            larger than told. None does not ask for it.
+            larger than told, and most at another waypoint. None does not ask for it.
         chance_of_refused: Whether to ask for it on a path that is refused without it, too.
         known: What this rover with these options has found on this ground so far; grows. It saves
             time and changes nothing else.

@@ -29,6 +29,7 @@ from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Crossings, add_up, angle_ahead, distance_between
 from rover_physics.prediction.path_motion import motions_of
+from rover_physics.prediction.slots import stop_in_slots
 from rover_physics.prediction.sweep import check_poses, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
@@ -234,6 +235,7 @@ class _Sweep:
             results["wheel_drop"][piece] = drops.heights
             results["falling"][piece] = drops.at_waypoints
             inside.results["falling"] = drops.between
+            stop_in_slots(results[piece], inside)
         return between, []
 
 

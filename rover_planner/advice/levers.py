@@ -213,9 +213,10 @@ def _reverse(case: Case, _refusal: JudgedCase, _value: Any) -> Case:
 
 
 def _spacing(case: Case) -> float:
-    """Return the distance of waypoints [m] of a path of its own."""
+    """Return the distance of waypoints [m] of a path of its own, where it does not turn."""
     steps = np.diff(distance_along(case.poses))
-    return float(np.median(steps)) if (steps > 0.0).any() else case.spacing
+    driven = steps[steps > 0.0]
+    return float(np.median(driven)) if len(driven) else case.spacing
 
 
 def _with_path(change: Callable[[Case, JudgedCase, float], Any]) -> Callable[..., Case | None]:

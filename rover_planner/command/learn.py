@@ -101,6 +101,9 @@ def learn(
         sunk, strength = learner.estimate.soil.sinkage[0], learner.estimate.soil.strength[0]
         high += f"; sinkage {1e3 * sunk:.1f} mm, strength {strength:.2f} of the load"
     typer.echo(f"wrote {out}: friction {found.mean:.2f}, at least {found.low:.2f}, {high}")
+    if learner.estimate.faults:
+        faults = ", ".join(f"{wheel} {word}" for wheel, word in learner.estimate.faults.items())
+        typer.echo(f"warning: sensors that were not believed: {faults}", err=True)
 
 
 def _read_log(path: Path, rover: "Rover", odometry_topic: str) -> "Floats":

@@ -63,7 +63,7 @@ def view(
 ) -> None:
     """Show the rover on a terrain in a web page: watch it drive, see why it can or cannot.
 
-    Exit code 0: it was interrupted. 2: bad input.
+    Exit code 0: Ctrl-C ended the page. 2: bad input. 130: Ctrl-C came before there was a page.
     """
     if follow and prediction is not None:
         raise PlanningError("--follow and --prediction exclude each other: live or recorded")

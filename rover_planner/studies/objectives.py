@@ -125,13 +125,13 @@ def _lift_limit(study: Study, rover: Rover) -> Rover:
 def _ground(rover: Rover, drive: StudyDrive) -> Terrain:
     if drive.file is not None:
         return _load_once(drive.file)
-    half = drive.length + 2.0 * _length(rover) + abs(drive.start[0]) + abs(drive.start[1])
+    room = drive.length + abs(drive.start[0]) + abs(drive.start[1])
+    if drive.slope is None:
+        return step_ground(rover, drive.step or 0.0, room)
     cell = 0.2 * rover.wheel.radius
-    axis = _make_axis(half, cell)
+    axis = _make_axis(room + 2.0 * _length(rover), cell)
     x = np.broadcast_to(axis, (len(axis), len(axis)))
-    if drive.slope is not None:
-        return Terrain(np.tan(drive.slope) * x, cell, (axis[0], axis[0]))
-    return step_ground(rover, drive.step or 0.0)
+    return Terrain(np.tan(drive.slope) * x, cell, (axis[0], axis[0]))
 
 
 @lru_cache(maxsize=16)
@@ -143,12 +143,12 @@ def _length(rover: Rover) -> float:
     return rover.wheelbase + 2.0 * rover.wheel.radius
 
 
-def step_ground(rover: Rover, height: float) -> Terrain:
-    """Return level ground that rises by a step across x = 0."""
+def step_ground(rover: Rover, height: float, room: float = 0.0) -> Terrain:
+    """Return level ground that rises by a step across x = 0, with room [m] to all sides."""
     cell = 0.1 * rover.wheel.radius
-    half = 2.0 * _length(rover)
-    axis = _make_axis(half, cell, 0.6)
-    wide = _make_axis(0.6 * half, cell)
+    half, half_width = room + 2.0 * _length(rover), room + 1.2 * _length(rover)
+    axis = _make_axis(half, cell, half_width / half)
+    wide = _make_axis(half_width, cell)
     profile = np.where(axis > 0.0, height, 0.0)
     return Terrain(np.tile(profile, (len(wide), 1)), cell, (axis[0], wide[0]))
 

@@ -208,10 +208,8 @@ def describe_question(study: Study) -> list[str]:
     ]
     for parameter in study.parameters:
         along = f", with {len(parameter.also)} more" if parameter.also else ""
-        lines.append(
-            f"  {parameter.name}: {parameter.low:g} to {parameter.high:g} {parameter.unit}, "
-            f"now {parameter.now:g}{along}"
-        )
+        bounds = f"{parameter.low:g} to {parameter.high:g} {parameter.unit}".rstrip()
+        lines.append(f"  {parameter.name}: {bounds}, now {parameter.now:g}{along}")
     return lines
 
 

@@ -100,7 +100,7 @@ class StudyParameter(ParameterEntry):
 class StudyDrive:
     """A straight drive over a slope, a step or the terrain of a file; one of the three is set."""
 
-    slope: Annotated[float, number("rad")] | None = None
+    slope: Annotated[float, number("rad", least=-1.5, most=1.5)] | None = None
     """Angle of the slope [rad]."""
     step: Metres | None = None
     """Height of the step across x = 0 [m]."""

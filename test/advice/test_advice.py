@@ -14,7 +14,7 @@ from rover_planner.advice import case as case_module
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case
-from rover_planner.advice.levers import Choice
+from rover_planner.advice.levers import LEVERS, Choice
 from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
@@ -207,6 +207,15 @@ def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):
     assert not coarse.found and coarse.tried == fine.tried == ("curve",)
     (setting,) = fine.found[0].levers
     assert setting.value == pytest.approx(0.4, abs=0.04)
+
+
+def test_a_path_that_mostly_turns_on_the_spot_is_driven_backward():
+    refusal = refused_by(slope, friction=0.3).judge()
+    turn = np.tile(STRAIGHT[0], (100, 1)) + np.linspace([0.0, 0.0, -1.0], 0.0, 100)
+    turning = replace(refusal.case, poses=np.concatenate([turn, STRAIGHT]))
+    backward = next(lever for lever in LEVERS if lever.name == "backward")
+    reversed_ = backward.apply(turning, refusal, True)
+    assert reversed_ is not None and (reversed_.poses[0] == turn[0]).all()
 
 
 @pytest.mark.parametrize("size", [0.25, 2.0])

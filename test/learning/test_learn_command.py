@@ -10,7 +10,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.rover_file import save_rover
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
-from rover_planner.learning.drive_log import PITCH, ROLL, STEERING, SUSPENSION, TIME, X
+from rover_planner.learning.drive_log import PITCH, ROLL, STEERING, SUSPENSION, TIME, TORQUES, X
 from support.command_line import assert_refused, predict_arguments
 from support.learning_drives import NAMES, climb, ramp, write_csv
 from support.rovers import LSR1 as ROVER
@@ -122,6 +122,15 @@ def test_a_drive_that_teaches_nothing_says_why(folder, capfd, columns, factor, w
     write_csv(folder / "drive.csv", rows)
     assert_refused(capfd, main(arguments(folder)), word)
     assert not (folder / "out.json").exists()
+
+
+def test_torques_that_were_not_measured_are_named_on_the_terminal(folder, capfd):
+    rows = climb(ROVER, SLOPE, 8.0)
+    rows[:, TORQUES.start : TORQUES.stop : 3] = np.nan
+    write_csv(folder / "drive.csv", rows)
+    assert main(arguments(folder)) == 0
+    warning = "sensors that were not believed: rear_right no torque, rear_left no torque"
+    assert capfd.readouterr().err == f"warning: {warning}\n"
 
 
 def test_steering_in_degrees_is_refused(folder, capfd):

@@ -71,6 +71,15 @@ def test_a_drive_that_breaks_another_limit_gives_no_value_but_the_reason():
         assert np.isnan(trial.objective) == is_low == ("drive 1: belly clearance" in trial.note)
 
 
+def test_a_long_drive_over_a_step_stays_on_the_ground():
+    drives = [{"step": 0.05, "start": [-1.0, 1.0, -0.3], "length": 6.0}]
+    parameters = [{"name": "belly.z", "from": -0.1, "to": -0.05, "count": 2}]
+    trials = run_study(
+        study(objective="worst_utilisation", drives=drives, parameters=parameters)
+    ).trials
+    assert np.isfinite([trial.objective for trial in trials]).all()
+
+
 def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones():
     parameters = [
         {
@@ -96,6 +105,7 @@ def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones
         ({"parameters": [PIVOT_X | {"also": ["wheel.mass"]}]}, "names of numbers in m"),
         ({"soil": "dry_sand"}, "left out"),
         ({"objective": "tip_over_margin", "drives": [{"length": 1.0}]}, "one of slope"),
+        ({"objective": "tip_over_margin", "drives": [{"slope": 3}]}, "slope is 3 at most 1.5"),
     ],
 )
 def test_what_a_study_file_must_not_say_is_refused_by_name(changes, text):

@@ -104,6 +104,14 @@ def test_ctrl_c_ends_the_page_though_a_library_forgets_it_while_it_is_imported(t
     assert (ended.returncode, ended.stderr) == (EXIT_INTERRUPTED, "")
 
 
+def test_ctrl_c_while_the_command_is_imported_leaves_no_trace(tmp_path):
+    (tmp_path / "typer.py").write_text("import os\nos.kill(os.getpid(), 2)\n")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(TOP)])}
+    command = [sys.executable, "-m", "rover_planner"]
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+    assert (ended.returncode, ended.stderr) == (EXIT_INTERRUPTED, "")
+
+
 @pytest.mark.parametrize(
     ("words", "module", "install"),
     [

@@ -220,11 +220,12 @@ class TraverseService:
         if ground is None or told is None or known.terrain.ground_class is None:
             return {}, known
         classes = ground.assume_classes(known.terrain, told)
-        if self._laid is None or self._laid[:2] != (known, classes):
+        last = self._laid  # which another thread may replace meanwhile
+        if last is None or last[:2] != (known, classes):
             laid = replace(known, terrain=lay_friction(known.terrain, classes))
             pack_ground(laid.terrain)
-            self._laid = known, classes, laid
-        return classes, self._laid[2]
+            last = self._laid = known, classes, laid
+        return classes, last[2]
 
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.

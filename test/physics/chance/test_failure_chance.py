@@ -205,7 +205,7 @@ def test_a_rover_that_does_not_settle_fails_for_sure():
 
 
 def test_the_docs_tell_what_is_uncertain_and_its_default():
-    rows = re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", DOCS.read_text(), re.MULTILINE)
+    rows = re.findall(r"^- `(\w+)` \(([\d.]+)\)", DOCS.read_text(), re.MULTILINE)
     assert {name: float(value) for name, value in rows} == vars(Uncertainty())
     assert set(DEVIATES) == set(vars(Uncertainty()))
 

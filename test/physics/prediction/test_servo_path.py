@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What only the path shows under policy "servo": lifts, wedged wheels, drift."""
+"""What only the path shows under policy "servo": lifts, momentum, drift."""
 
 from dataclasses import replace
 
@@ -52,12 +52,6 @@ def test_a_turn_on_the_spot_that_weak_motors_do_not_brake_has_a_finite_speed(max
     assert np.isfinite(found.speed_share[found.settled]).all()
 
 
-def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged():
-    wide, narrow = (drive("ditch", w, friction=0.8, max_torque=2.44)[1] for w in (0.183, 0.10))
-    assert wide.code == "friction" and "wedged" in wide.reason
-    assert narrow.traversable
-
-
 def over_a_hill(speed: float, max_torque: float):
     """Return prediction and verdict of the way up a hill of 0.1 m at a speed [m/s]."""
     ground = make_terrain(lambda x, y: 0.05 * np.cos(np.pi * x / 1.5), 0.02, 2.0)
@@ -103,3 +97,10 @@ def test_a_higher_step_costs_more_energy_hardly_depending_on_the_spacing_of_wayp
     )  # fmt: skip
     assert (np.diff(coarse) > 3.0).all()
     np.testing.assert_allclose(fine, coarse, rtol=0.1)
+
+
+def test_a_turn_about_a_wheel_costs_the_power_of_the_wheels_in_its_time():
+    radius = LSR1.suspension.wheels["middle"][1]
+    path = arc_of(1.0 / radius, np.linspace(0.0, 0.4, 41))
+    found = judge_path(LSR1, fractal(4), path, SERVO)[0]
+    assert found.energy[-1] == pytest.approx(np.trapezoid(found.power, found.time), rel=0.15)
