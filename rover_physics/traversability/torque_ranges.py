@@ -116,7 +116,7 @@ def _is_within(model: PackedModel, results: Any) -> bool:
     """Return whether a RESULT (1,) is within its limits of load, friction and torque."""
     uses = find_uses(model.limits, results)
     decisive = [row.code in WHEEL_CONSTRAINTS for row in uses.limits.rows]
-    return bool((uses.use[0, decisive] < 1.0).all())
+    return not bool((uses.use[0, decisive] >= 1.0).any())  # NaN is not asked
 
 
 def _describe_set(

@@ -12,7 +12,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Progress
+from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, WorkStep
 from rover_planner.viewer.state.judging import Step
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 from rover_planner.viewer.state.session import REFUSALS, ViewSession
@@ -170,7 +170,7 @@ def held(session: ViewSession, at: str = "") -> Iterator[None]:
     def find_and_wait(*asked: Any) -> Iterator[Step]:
         for found in find_steps(*asked):
             yield found
-            is_held = isinstance(found, Progress) and at in ("", found.what)
+            is_held = isinstance(found, WorkStep) and at in ("", found.what)
             while is_held and not go_on.wait(0.01):
                 yield found  # which ends work that was stopped
 

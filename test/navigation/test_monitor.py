@@ -19,7 +19,7 @@ from rover_planner.planning.navigation.monitor import (
     SuspensionDrift,
     describe_watch,
 )
-from rover_planner.planning.navigation.watched_path import WatchedPath
+from rover_planner.planning.navigation.watched_path import USUAL_RADIUS, WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
 from support.grounds import make_terrain, wall_at, waves
 from support.rough_grounds import with_std
@@ -68,6 +68,20 @@ def test_a_path_that_comes_back_to_its_start_is_watched_from_the_start(service):
         assert monitor.take_path(WatchedPath(loop), sight(service, error))
         found = monitor.look(sight(service, error))
         assert found.state == WATCHING and found.place.remaining > 6.0
+
+
+@pytest.mark.parametrize("size", [1.0 / 16.0, 16.0])
+def test_the_place_of_a_rover_of_another_size_is_that_of_its_like(size):
+    turn = np.linspace(0.0, 4.0 * np.pi, 800)
+    loops = np.column_stack([np.sin(2.0 * turn), np.sin(turn), turn])
+    noise = np.random.default_rng(1).normal(0.0, 0.05, loops.shape)
+    units = [size, size, 1.0]
+    usual, like = WatchedPath(loops), WatchedPath(loops * units)
+    place = None
+    for pose in loops + noise:
+        last = None if place is None else place.index
+        place = usual.find_place(pose, last)
+        assert like.find_place(pose * units, last, size * USUAL_RADIUS).index == place.index
 
 
 def test_the_place_goes_on_where_a_path_backs_up():

@@ -11,7 +11,7 @@ import pytest
 
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
-from rover_planner.viewer.state.background_work import BackgroundWork, Progress
+from rover_planner.viewer.state.background_work import BackgroundWork, WorkStep
 from rover_planner.viewer.state.judging import PATH, judge_steps
 from rover_planner.viewer.state.scenario import Scenario
 from support.grounds import make_terrain, waves
@@ -29,7 +29,7 @@ SLOW = Scenario(LSR1, LSR1, make_terrain(waves), START, GOAL, MANY)
 def judge_without_end():
     """Judge SLOW again and again, without a result."""
     while True:
-        yield from (one for one in judge_steps(SLOW) if isinstance(one, Progress))
+        yield from (one for one in judge_steps(SLOW) if isinstance(one, WorkStep))
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_a_newer_request_stops_at_once_what_follows_a_result(work, found):
         yield "old"
         while steps["old"] < 1000:
             steps["old"] += 1
-            yield Progress("step", 1, 1)
+            yield WorkStep("step", 1, 1)
             time.sleep(0.005)
 
     work.ask(count_steps())
@@ -138,9 +138,9 @@ def test_an_error_is_delivered_and_what_is_asked_next_is_done(error, work, found
 def test_a_process_ends_although_work_runs_in_it():
     code = (
         "import itertools, time\n"
-        "from rover_planner.viewer.state.background_work import BackgroundWork, Progress\n"
+        "from rover_planner.viewer.state.background_work import BackgroundWork, WorkStep\n"
         "work = BackgroundWork(print)\n"
-        "work.ask(itertools.repeat(Progress('on', 1, 1)))\n"
+        "work.ask(itertools.repeat(WorkStep('on', 1, 1)))\n"
         "while not work.progress.what: time.sleep(0.01)\n"
         "print('end', flush=True)\n"
     )

@@ -6,7 +6,7 @@ import numpy as np
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.documents.paths import describe_verdict
-from rover_planner.viewer.state.background_work import Progress
+from rover_planner.viewer.state.background_work import WorkStep
 from rover_planner.viewer.state.judging import BETTER, SEARCH, judge_steps
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_with_gap, waves
@@ -35,7 +35,7 @@ def whole_wall(x, y):
 def list_steps(session: ViewSession) -> list[str | int]:
     """Return what is begun, and how many paths each result has, when all is judged."""
     steps = judge_steps(session.wanted)
-    return [one.what if isinstance(one, Progress) else len(one.paths) for one in steps]
+    return [one.what if isinstance(one, WorkStep) else len(one.paths) for one in steps]
 
 
 def test_beyond_a_wall_with_a_gap_a_path_around_is_offered_and_the_path_looked_at_stays():

@@ -59,6 +59,11 @@ class Sight:
         """The parameters with the limits of the watch."""
         return self.snapshot.settings.parameters
 
+    @property
+    def wheel_radius(self) -> float:
+        """Wheel radius of the rover [m]."""
+        return self.snapshot.settings.rover.wheel.radius
+
 
 @dataclass(frozen=True, eq=False)
 class Finding:
@@ -133,7 +138,7 @@ class PathMonitor:
         that is watched stays.
         """
         if sight.pose is not None:
-            offset = path.find_place(sight.pose).offset
+            offset = path.find_place(sight.pose, wheel_radius=sight.wheel_radius).offset
             if offset > sight.snapshot.settings.monitor_offset:
                 return False
         self._path, self._judged_on, self._pose_time = path, None, sight.time
@@ -183,7 +188,8 @@ class PathMonitor:
             return refusal(NO_POSE, f"the rover's pose is not known for {missing:.1f} s")
         self._pose_time = sight.time
         last = self.finding.place
-        place = path.find_place(sight.pose, None if last is None else last.index)
+        seen = None if last is None else last.index
+        place = path.find_place(sight.pose, seen, sight.wheel_radius)
         self.finding = replace(self.finding, place=place)
         most = sight.snapshot.settings.monitor_offset
         if place.offset <= most:

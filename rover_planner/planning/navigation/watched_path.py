@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.path_geometry import distance_along
 
+USUAL_RADIUS = 0.1
+"""Wheel radius of a rover for which the distances below are meant [m]; for others they are as much
+larger as its wheels."""
 LOOK_AHEAD = 2.0
 """Distance along the path beyond the last place in which the next one is looked for [m]."""
 LOOK_BACK = 0.3
@@ -50,26 +53,32 @@ class WatchedPath:
         """Distance (n,) of each waypoint from the start, along the path [m]."""
         return distance_along(self.poses)
 
-    def find_place(self, pose: NDArray[np.float64], last: int | None = None) -> Place:
+    def find_place(
+        self,
+        pose: NDArray[np.float64],
+        last: int | None = None,
+        wheel_radius: float = USUAL_RADIUS,
+    ) -> Place:
         """Return the waypoint that is nearest to a pose.
 
         Args:
             pose: (3,) x, y [m] and yaw [rad] of the body.
             last: Index of the waypoint found last; only those around it are looked at. None looks
                 at all, for a rover that has yet to drive the path.
+            wheel_radius: Wheel radius of the rover [m].
         """
-        along = self.distances
+        along, size = self.distances, wheel_radius / USUAL_RADIUS
         first, end = 0, len(self.poses)
         if last is not None:
-            first = int(np.searchsorted(along, along[last] - LOOK_BACK))
-            end = int(np.searchsorted(along, along[last] + LOOK_AHEAD, side="right"))
+            first = int(np.searchsorted(along, along[last] - size * LOOK_BACK))
+            end = int(np.searchsorted(along, along[last] + size * LOOK_AHEAD, side="right"))
         away = np.hypot(*(self.poses[first:end, :2] - pose[:2]).T)
         turned = wrap(self.poses[first:end, 2] - pose[2])
-        apart = np.hypot(away, TURN_LENGTH * turned)
+        apart = np.hypot(away, size * TURN_LENGTH * turned)
         on = along[first:end] - along[0 if last is None else last]
         likely = (
             apart
-            + AHEAD_WEIGHT * np.clip(on, 0.0, MOST_AHEAD)
+            + AHEAD_WEIGHT * np.clip(on, 0.0, size * MOST_AHEAD)
             - BEHIND_WEIGHT * np.minimum(on, 0.0)
         )
         nearest = _descend(apart, int(np.argmin(likely)))

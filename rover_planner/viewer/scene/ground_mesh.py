@@ -14,7 +14,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
 from rover_planner.viewer.scene.canvas import find_origin
 from rover_planner.viewer.state import layers
-from rover_planner.viewer.state.background_work import Progress
+from rover_planner.viewer.state.background_work import WorkStep
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 SHADES = (0.3, 1.25)
@@ -32,12 +32,12 @@ the screen takes most of the time of a picture."""
 
 def paint(
     asked: layers.LayerRequest, survey: ShownSurvey | None = None
-) -> Iterator[Progress | tuple[bytes, Mapping[str, Any]]]:
+) -> Iterator[WorkStep | tuple[bytes, Mapping[str, Any]]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
     A layer that is predicted for the rover takes seconds.
     """
-    yield Progress("ground")
+    yield WorkStep("ground")
     name, ground = asked.how.layer, layers.thin(asked.terrain)
     if survey is not None and name in survey.names:
         places = layers.spread(ground, layers.count_pixels(ground))

@@ -20,8 +20,8 @@ Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
-class Progress:
-    """Progress of the work."""
+class WorkStep:
+    """A step of the work that has begun."""
 
     what: str = ""
     """Name of what is worked on; empty before the first."""
@@ -38,7 +38,7 @@ class Progress:
         return f"{self.what or 'waiting'}{many}"
 
 
-Steps = Iterator[Progress | Result]
+Steps = Iterator[WorkStep | Result]
 """Yields what is begun, and all results, each as soon as it is known."""
 Take = Callable[[Steps[Result], Result | BaseException], object]
 """Takes a result of steps, or the error that ended them."""
@@ -71,7 +71,7 @@ class BackgroundWork(Generic[Result]):
         self._waiting: Steps[Result] | None = None
         self._in_work: Steps[Result] | None = None
         self._has_result = False
-        self._progress = Progress()
+        self._progress = WorkStep()
         self._since = 0.0
         self._threads: list[threading.Thread] = []
         """The last one is that of the steps in work; those before it end their last steps."""
@@ -84,7 +84,7 @@ class BackgroundWork(Generic[Result]):
         """
         with self._lock:
             if self._in_work is None or self._has_result:
-                self._progress, self._since = Progress(), time.monotonic()
+                self._progress, self._since = WorkStep(), time.monotonic()
                 self._begin(steps)
             else:
                 self._waiting = steps
@@ -97,8 +97,8 @@ class BackgroundWork(Generic[Result]):
         return was_busy
 
     @property
-    def progress(self) -> Progress | None:
-        """Progress of the work; None if there is none."""
+    def progress(self) -> WorkStep | None:
+        """Step of the work; None if there is none."""
         with self._lock:
             if self._in_work is None:
                 return None
@@ -131,7 +131,7 @@ class BackgroundWork(Generic[Result]):
         try:
             with interruptible(check):
                 for found in steps:
-                    if isinstance(found, Progress):
+                    if isinstance(found, WorkStep):
                         check()
                         with self._lock:
                             self._progress = found

@@ -17,13 +17,13 @@ from rover_planner.planning.path_query import check_path, choose, generate_paths
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import SearchResult, find_path
 from rover_planner.planning.search.query import SearchQuery
-from rover_planner.viewer.state.background_work import Progress
+from rover_planner.viewer.state.background_work import WorkStep
 from rover_planner.viewer.state.scenario import JudgedPath, Scenario, Shown
 
 PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
 SEARCH, BETTER = "searching for a path", "path found, searching for a better one"
 """Names of steps."""
-Step = Progress | Shown
+Step = WorkStep | Shown
 """The beginning of a step, or what is known."""
 
 
@@ -58,13 +58,13 @@ def judge_steps(
     shown = replace(shown, reference=_recall(shown, before, values))
     yield shown
     if shown.reference is None and not shown.path.is_of(shown.path.poses, values):
-        yield Progress(COMPARE)
+        yield WorkStep(COMPARE)
         shown = replace(shown, reference=_judge(values, shown.path.poses))
         yield shown
     if shown.old:
         paths = list(shown.paths)
         for k in sorted(shown.old):
-            yield Progress(PATH, k + 1, len(paths))
+            yield WorkStep(PATH, k + 1, len(paths))
             paths[k] = _judge(asked, paths[k].poses)
         shown = replace(shown, paths=tuple(paths))
         yield shown
@@ -73,7 +73,7 @@ def judge_steps(
     shown = yield from _add_policies(shown)
     yield shown
     if shown.chance is None:
-        yield Progress(CHANCE)
+        yield WorkStep(CHANCE)
         shown = _add_chance(shown)
         yield shown
     on_map = all(asked.terrain.contains(*end[:2]) for end in (asked.start, asked.goal))
@@ -104,7 +104,7 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
         paths = [asked.recorded]
     judged = []
     for k, poses in enumerate(paths):
-        yield Progress(PATH, k + 1, len(paths))
+        yield WorkStep(PATH, k + 1, len(paths))
         judged.append(_judge(asked, poses))
     chosen = choose(tuple(judged)).nearest
     verdict = judged[chosen].verdict
@@ -120,7 +120,7 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
         paths = (*paths[:generated], *(paths[index : index + 1] if index >= generated else ()))
         index = min(index, generated)
     if path.scenario is not asked:
-        yield Progress(PATH)
+        yield WorkStep(PATH)
         path = _judge(asked, path.poses)
     paths = (*paths[:index], path, *paths[index + 1 :])
     old, judged_for = before.by_policy, before.policies_for
@@ -147,7 +147,7 @@ def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
     for k, policy in enumerate(TORQUE_POLICIES):
         if policy == asked.options.model.policy or shown.policies_for is asked:
             continue
-        yield Progress(POLICY, k + 1, len(TORQUE_POLICIES))
+        yield WorkStep(POLICY, k + 1, len(TORQUE_POLICIES))
         try:
             values = asked.change_options(policy=policy)
             found[policy] = _judge(values, shown.path.poses).verdict
@@ -174,7 +174,7 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
 
     Without one, what is shown has the reason.
     """
-    yield Progress(SEARCH)
+    yield WorkStep(SEARCH)
     asked = shown.scenario
     question = SearchQuery(asked.rover, asked.terrain, asked.start, asked.goal, asked.options)
     first = find_path(question, replace(asked.search, ends_at_first=True), memory)
@@ -182,7 +182,7 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
     left = asked.search.budget - first.seconds
     if first.path is None or left <= 0.0:
         return
-    yield Progress(BETTER)
+    yield WorkStep(BETTER)
     better = find_path(question, replace(asked.search, budget=left), memory)
     if better.cost < first.cost:
         yield _add_path(shown, better)
