@@ -159,13 +159,15 @@ def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lan
 
     It has a number if it is that of one row of the table.
     """
-    prediction, every, k = rows.prediction, np.arange(len(rows.distance)), int(of_limit[0])
+    prediction, every = rows.prediction, np.arange(len(rows.distance))
+    numbered = [k for k in of_limit.tolist() if uses.limits.rows[k].has_number]
+    k = (numbered or of_limit.tolist())[0]
     limit, bound = uses.limits.rows[k], uses.limits.bounds[k]
     asked = np.where(np.isnan(uses.use[:, of_limit]), -np.inf, uses.use[:, of_limit])
     decides = of_limit[asked.argmax(axis=1)]
     used = np.where(prediction.settled, uses.use[every, decides], np.nan)
     lane = Lane(limit.code, limit.title, used, decides=decides)
-    if len(of_limit) > 1 or limit.sense == Sense.RANGE:
+    if len(numbered) != 1 or limit.sense == Sense.RANGE:
         return lane
     unit, kept = limit.shown or limit.unit, np.ones(len(every))
     if limit.keeps_margin:

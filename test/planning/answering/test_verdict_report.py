@@ -37,9 +37,9 @@ def test_the_docs_have_the_keys_of_a_full_report_and_no_other(full, service):
     identity = Register().identify("can_traverse", "ab", service.snapshot())
     report = replace(full.report, identity=identity)
     text = DOCS.read_text()
-    table = text[text.index("| key | meaning |") :]
-    rows = table[: table.index("\n\n")].splitlines()[2:]
-    told = [key for row in rows for key in re.findall(r"`(\w+)`", row.split("|")[1])]
+    keys = text[text.index("\n- `traversable`") :]
+    rows = keys[: keys.index("\n\n", 1)].split("\n- ")[1:]
+    told = [key for row in rows for key in re.findall(r"`(\w+)`", row.split(":")[0])]
     assert sorted(told) == sorted(report.to_dict())
     assert list(report.to_dict())[:3] == ["traversable", "code", "reason"]
 
