@@ -134,8 +134,8 @@ def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats
     A wheel that climbs takes its time while the body hardly moves. The distance that the rover
     goes is the mean of those of its wheel centres; a wheel that goes down more steeply than 45
     degrees falls, which takes no time. Meanwhile the others slip: that energy is their power in
-    the time. Both are sums since the first waypoint, over the steps
-    between settled waypoints that have poses between them.
+    the time. Both are sums since the first waypoint, over the steps between settled waypoints that
+    have poses between them.
 
     Args:
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import SweepOptions
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_planner.viewer.documents import paths
-from rover_planner.viewer.state.path_limits import Lane
+from rover_planner.viewer.state.path_limits import Lane, find_failure, find_path_limits
 from rover_planner.viewer.state.scenario import CANDIDATES, JudgedPath, Shown
 from support.grounds import gap, wall_at, waves
+from support.reference_drives import drive_ground, drive_path, unlimited
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
 
@@ -205,6 +207,16 @@ def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross()
 
 
 # The failure.
+
+
+def test_a_wedged_wheel_has_no_number_beside_the_limit_of_friction():
+    rover, ground = unlimited(LSR1), drive_ground("ditch", 0.194)
+    options = SweepOptions(OPTIMAL, friction=0.86, max_torque=2.44)
+    prediction, verdict = judge_path(rover, ground, drive_path(), options)
+    limits = find_path_limits(rover, prediction, verdict)
+    failure = find_failure(rover, ground, verdict, limits)
+    assert "wedged" in failure.headline
+    assert not limits.lane("friction").write_value(failure.row)
 
 
 def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():

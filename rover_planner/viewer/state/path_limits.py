@@ -177,9 +177,10 @@ def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lan
     wheels = None
     if count == len(WHEELS) and limit.sense == Sense.MOST:
         wheels = np.where(np.isnan(uses.use[:, [k]]), np.nan, values / (bound * kept)[:, None])
+    nearest = values[every, np.maximum(uses.element[every, k], 0)]
     return replace(
         lane,
-        values=unit.factor * values[every, np.maximum(uses.element[every, k], 0)],
+        values=unit.factor * np.where(decides == k, nearest, np.nan),
         bounds=unit.factor * bound * kept,
         unit=unit,
         is_lowest=limit.sense in (Sense.LEAST, Sense.SHARE),
