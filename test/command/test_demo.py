@@ -89,11 +89,8 @@ def test_goals_that_a_busy_server_has_no_time_for_are_refused_in_the_table(
 ):
     """The demo ended with "it said nothing"."""
     usual = demo_module._server_parameters
-    monkeypatch.setattr(
-        demo_module,
-        "_server_parameters",
-        lambda *words: (*usual(*words), "-p", "time_budget:=0.05"),
-    )
+    busy = "-p", "time_budget:=0.05", "-p", "candidate_count:=99"
+    monkeypatch.setattr(demo_module, "_server_parameters", lambda *words: (*usual(*words), *busy))
     answers = demo_module.run_demo(str(map_file), tmp_path / "demo.png")
     refused = [answer["code"] for answer in answers if not answer["traversable"]]
     assert "too_long" in refused
