@@ -25,8 +25,8 @@ MOST_REMEDIES = 5
 ENDS_APART = 0.5
 """Distance of two poses [wheelbases] from which they are start and goal, and no path."""
 
-SAME_WAY = 0.3
-"""Way [wheel radii] at nominal speed in whose times remedies are compared."""
+SAME_DISTANCE = 0.3
+"""Distance [wheel radii] in whose times at nominal speed remedies are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +139,6 @@ def _rank(remedy: Remedy) -> tuple[Any, ...]:
     return (
         remedy.needs_others,
         len(remedy.levers),
-        round(remedy.extra_time * rover.nominal_speed / (SAME_WAY * rover.wheel.radius)),
+        round(remedy.extra_time * rover.nominal_speed / (SAME_DISTANCE * rover.wheel.radius)),
         remedy.judged.largest_use[0],
     )

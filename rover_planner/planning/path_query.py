@@ -26,7 +26,7 @@ Pose = NDArray[np.float64]
 RISK_STEP = 0.05
 """Rounding step of risks [share of a limit]: paths of equal rounded risk differ by energy."""
 WAYPOINTS = 5.0
-"""Usual number of waypoints on the way of a wheel radius."""
+"""Usual number of waypoints in a wheel radius."""
 CANDIDATE_SPACING = 15.0
 """Usual distance between candidates half-way [usual distances of waypoints]: three wheel radii."""
 

@@ -23,9 +23,9 @@ from rover_planner.errors import PlanningError
 from rover_planner.simulator.mujoco_model import thin_out, write_model
 from rover_planner.simulator.plant import PlantState
 
-TIMESTEP, LONGEST_STEP = 0.004, 0.04
+TIMESTEP, LONGEST_TIMESTEP = 0.004, 0.04
 """Time step of the simulation [s]; a part of it for small rovers, for which it is longer than
-LONGEST_STEP times sqrt(wheel radius / gravity)."""
+LONGEST_TIMESTEP times sqrt(wheel radius / gravity)."""
 DROPS = 5.0
 """The rover is dropped from the height of a wheel radius over this."""
 SETTLING_TIME = 3.0
@@ -59,7 +59,7 @@ class WheelContacts:
 
 def find_timestep(rover: Rover) -> float:
     """Return the time step [s] that suits a rover; TIMESTEP is a multiple of it."""
-    longest = LONGEST_STEP * math.sqrt(rover.wheel.radius / rover.gravity)
+    longest = LONGEST_TIMESTEP * math.sqrt(rover.wheel.radius / rover.gravity)
     return TIMESTEP / math.ceil(TIMESTEP / longest)
 
 
