@@ -217,7 +217,7 @@ def bound_pose(uncertain, nominal, work, result):
     _write_tip_over(model.settings, box, result)
     moved = _load_moved(model.linkage, nominal, box)
     for wheel in range(6):
-        _write_wheel(model, (wheel, moved), box, result)
+        _write_wheel(model, wheel, moved, box, result)
     if model.settings.policy != TorquePolicy.EQUAL:
         _let_torques_follow(model.settings, work.rover.search, result)
     return BoundStatus.BOUNDED
@@ -256,12 +256,12 @@ def _load_moved(linkage, nominal, box):
 
 
 @kernel
-def _write_wheel(model, load, box, result):
+def _write_wheel(model, wheel, moved, box, result):
     """Write the bounds on load, sinkage, torque saturation and utilisation of a wheel.
 
-    `load` is (wheel, `_load_moved`): the best torques on soil move loads on any map about as far.
+    `moved` is `_load_moved`: the best torques on soil move loads on any map about as far.
     """
-    ground, linkage, settings, (wheel, moved) = model.ground, model.linkage, model.settings, load
+    ground, linkage, settings = model.ground, model.linkage, model.settings
     weight = linkage.mass * linkage.gravity
     lightest = weight * box.smallest[LOAD_OUTPUTS + wheel]
     heaviest = weight * box.largest[LOAD_OUTPUTS + wheel]

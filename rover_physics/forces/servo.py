@@ -16,7 +16,7 @@ import numpy as np
 
 from rover_physics.forces.equilibrium import write_equations
 from rover_physics.forces.servo_balance import STRETCH, contact_velocity, motion_made
-from rover_physics.forces.servo_motion import MOTIONS, TURN_WAY, WEIGHTS, find_motions
+from rover_physics.forces.servo_motion import MOTIONS, TURN_DISTANCE, WEIGHTS, find_motions
 from rover_physics.forces.servo_search import CREEP, find_drive, search_everywhere
 from rover_physics.forces.servo_soil import direction_of_travel
 from rover_physics.forces.servo_wheel import D, S, T
@@ -59,7 +59,7 @@ def balance_servos(model, work):
     servo.max_traction = settings.allowed_torque / push
     for k in range(MOTIONS):
         servo.nominal[k] = work.motion[k] / settings.speed
-    servo.nominal[2] *= TURN_WAY * linkage.radius
+    servo.nominal[2] *= TURN_DISTANCE * linkage.radius
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         mu = friction_at(model.ground, x, y, settings.friction)
@@ -112,7 +112,7 @@ def write_servo_forces(model, work, result):
     result.torque_share = saturation / 6.0
     for k in range(MOTIONS):
         result.deviation[k] = servo.deviation[k]
-    result.deviation[2] /= TURN_WAY * linkage.radius
+    result.deviation[2] /= TURN_DISTANCE * linkage.radius
 
 
 @kernel

@@ -28,9 +28,9 @@ SCRUB = 13
 """First column of X with scrub forces."""
 COLUMNS = 19
 """Columns of X."""
-TURN_WAY = 10.0
-"""Way [wheel radii] per which turning counts: in a tight curve, a rover turns by about a radian
-while it goes so far."""
+TURN_DISTANCE = 10.0
+"""Distance [wheel radii] per which turning counts: in a tight curve, a rover turns by about a
+radian while it goes so far."""
 GAUSS_POINT = 1.0 / np.sqrt(3.0)
 """Places of two points that stand for a uniform pressure, as of soil, over half the width."""
 FLUSH = 0.02
@@ -80,7 +80,7 @@ SERVO = record_type(
     ("stall", np.int64),  # why the rover does not drive if its speed share is 0: a Stall
 )
 """Inputs, unknowns and results of `solve_servo`. Forces are over the rover's weight, velocities
-over the nominal speed, turning rates in rad per TURN_WAY of nominal distance."""
+over the nominal speed, turning rates in rad per TURN_DISTANCE of nominal distance."""
 
 
 @kernel
@@ -95,7 +95,7 @@ def find_motions(linkage, placement, contacts, balance, servo):
         servo: SERVO; `nominal` is read, and X, base, velocity, command and spread are written.
     """
     X = servo.X
-    _write_base(placement, TURN_WAY * linkage.radius, servo)
+    _write_base(placement, TURN_DISTANCE * linkage.radius, servo)
     for row in range(UNKNOWNS):
         for wheel in range(6):
             servo.M[row, wheel] = balance.A[row, wheel]
@@ -127,18 +127,18 @@ def find_motions(linkage, placement, contacts, balance, servo):
 
 
 @kernel
-def _write_base(placement, turn_way, servo):
+def _write_base(placement, turn_distance, servo):
     """Write the level velocities of the wheels in unit motions, and the commanded rim speeds.
 
     A turning wheel rolls along its heading; one whose heading does not suit its motion slides. A
-    unit turn is one radian per `turn_way` [m].
+    unit turn is one radian per `turn_distance` [m].
     """
     R, origin = placement.R, placement.origin
     length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
     c, s = R[0, 0] / length, R[1, 0] / length
     for wheel in range(6):
-        x = (placement.centres[wheel, 0] - origin[0]) / turn_way
-        y = (placement.centres[wheel, 1] - origin[1]) / turn_way
+        x = (placement.centres[wheel, 0] - origin[0]) / turn_distance
+        y = (placement.centres[wheel, 1] - origin[1]) / turn_distance
         fx, fy = placement.forward[wheel, 0], placement.forward[wheel, 1]
         base = servo.base[wheel]
         base[0, 0], base[1, 0] = fx * c + fy * s, -fy * c + fx * s

@@ -41,7 +41,7 @@ LEAST_LOAD = 0.02
 """Least load, over the weight, at the start of a search."""
 CHANGES = (0.2, 0.1, 0.4)
 """Standard deviations of the motion, forward, left [over the nominal speed] and turning [rad per
-TURN_WAY], at the starts of a search."""
+TURN_DISTANCE], at the starts of a search."""
 
 
 def _draw_starts(count: int) -> np.ndarray:

@@ -210,15 +210,13 @@ def _write_barrier(balance, free, goal, level, search):
             _add_cone(balance, free, i, level, search)
         else:
             room = search.wheel_loads[i] + (level if goal == SearchGoal.LOAD else 0.0)
-            load = 1.0, 0.0, 1.0 / room, 1.0 / (room * room)
-            _add_log(balance, free, i, load, search)
+            _add_log(balance, free, i, 1.0, 0.0, 1.0 / room, 1.0 / (room * room), search)
         if traction < np.inf:
             thrust = _thrust(search, i)
             above, below = traction - thrust, traction + thrust
             slope = 1.0 / below - 1.0 / above
             curvature = 1.0 / (below * below) + 1.0 / (above * above)
-            torque = search.resistance[i], 1.0, slope, curvature
-            _add_log(balance, free, i, torque, search)
+            _add_log(balance, free, i, search.resistance[i], 1.0, slope, curvature, search)
 
     for j in range(free):
         for k in range(j):
@@ -226,12 +224,12 @@ def _write_barrier(balance, free, goal, level, search):
 
 
 @kernel
-def _add_log(balance, free, i, slack, search):
+def _add_log(balance, free, i, of_load, of_traction, slope, curvature, search):
     """Add the barrier -log of a linear slack of wheel i; only the lower half of H.
 
-    `slack` holds the shares of N and T in it, then slope and curvature of the barrier.
+    `of_load` and `of_traction` are the shares of N and T in it; slope and curvature are those of
+    the barrier.
     """
-    of_load, of_traction, slope, curvature = slack
     n, t = balance.normal, balance.tangential
     for j in range(free):
         row = of_load * n[i, 1 + j] + of_traction * t[i, 1 + j]
