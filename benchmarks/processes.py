@@ -18,7 +18,6 @@ from typing import Any
 import rclpy
 from nav_msgs.msg import Path as PathMessage
 from nav_msgs.srv import GetPlan
-from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -155,8 +154,8 @@ class Client:
 
     def set_parameter(self, name: str, value: object) -> bool:
         """Set a parameter of the server; return whether it was accepted."""
-        message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
-        request = SetParameters.Request(parameters=[message])
+        parameters = [Parameter(name, value=value).to_parameter_msg()]
+        request = SetParameters.Request(parameters=parameters)
         return finish(self._parameters.call_async(request), 10.0).results[0].successful
 
 

@@ -139,14 +139,13 @@ class Programs:
         self._nodes, self.clock = nodes, SteppedClock(nodes.folder)
         self.running: dict[str, ChildProcess] = {}
         rests = self._write("simulated_traction_controller", rest_policy="brake")  # no torques
+        maps = self._write("traverse_server", map_folder=str(nodes.folder))
         commands = simulation_commands(
             terrain_file=str(terrain),
             speed="0.08",
             rover_simulator_parameters=self._write("rover_simulator"),
             traction_controller_parameters=rests,
-            traverse_server_parameters=self._write(
-                "traverse_server", map_folder=str(nodes.folder)
-            ),
+            traverse_server_parameters=maps,
         )
         self._modules = {name: words[2:] for name, words in commands.items()}  # behind python -m
         page = [PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
