@@ -138,13 +138,13 @@ class Client:
         return self._plans[node].call_async(GetPlan.Request(**ends))
 
     def check(self, timeout: float = 60.0) -> dict[str, Any]:
-        """Return the verdict on the last path; raise LostAnswerError after a timeout [s]."""
+        """Return the verdict on the last path; raise TimeoutError after a timeout [s]."""
         return json.loads(finish(self.begin_check(), timeout).message)
 
     def plan(
         self, start: Pose, goal: Pose, timeout: float = START_TIME, node: str = SERVER
     ) -> PathMessage:
-        """Return a plan; raise LostAnswerError after a timeout [s]."""
+        """Return a plan; raise TimeoutError after a timeout [s]."""
         return finish(self.begin_plan(start, goal, node), timeout).plan
 
     def first_plan(self, start: Pose, goal: Pose, node: str = SERVER) -> PathMessage:

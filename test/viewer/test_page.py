@@ -168,12 +168,12 @@ def test_a_number_beyond_the_ends_of_its_slider_is_where_the_slider_is(visitor, 
     wait_for_rest(page)
 
 
-def test_a_dragged_number_is_judged_and_the_reason_of_a_refused_one_stays_on_the_screen(
+def test_a_number_of_a_slider_is_judged_and_the_reason_of_a_refused_one_stays_on_the_screen(
     visitor, page
 ):
     session, last = page.session, "wheel [kg]"
     visitor.open_tab("Rover")
-    visitor.drag_slider(FRICTION, 0.25)
+    visitor.click_share(f'input[type=range][aria-label="{FRICTION}"]', 0.25)
     wait_until(
         lambda: session.shown.scenario.rover.friction == pytest.approx(0.6, abs=0.06), "a quarter"
     )

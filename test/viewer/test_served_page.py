@@ -23,7 +23,6 @@ from support.viewer.sessions import (
     held,
     ramp,
     session_on,
-    shift,
     wait_for_rest,
 )
 from support.viewer.sessions import wait_patiently as wait_until
@@ -352,7 +351,8 @@ def test_a_camera_sees_all_of_the_path_from_behind_or_above_and_the_rover_from_i
 def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_where_it_is_aimed():
     places = {}
     for x, y in ((0.0, 0.0), FAR):
-        ground = shift(make_terrain(waves), (x, y))
+        ground = make_terrain(waves)
+        ground = replace(ground, origin=(ground.origin[0] + x, ground.origin[1] + y))
         page = Page(session_on(ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)))
         try:
             wait_for_rest(page)
