@@ -120,20 +120,15 @@ def test_any_grid_in_millimetres_comes_back_as_it_was(rows, columns, millimetres
     ("kind", "gap", "height", "row_padding"),
     [("<f4", 0, 1, 0), (">f4", 3, 7, 9), ("<f8", 3, 1, 5), (">f8", 0, 7, 0)],
 )
-def test_layout_does_not_change_the_terrain(kind, gap, height, row_padding):
+def test_layout_and_order_of_fields_do_not_change_the_terrain(kind, gap, height, row_padding):
     terrain = rough_terrain()
-    cloud = cloud_of(points_of(terrain), XYZ, kind, gap, height, row_padding)
+    x, y, z = points_of(terrain).T
+    mixed = np.column_stack([z, np.ones(len(z)), y, x])
+    cloud = cloud_of(mixed, ("z", "intensity", "y", "x"), kind, gap, height, row_padding)
     assert_same(terrain_from_point_cloud(cloud), terrain)
-
-
-def test_order_of_points_and_fields_does_not_change_the_terrain():
-    terrain = rough_terrain()
-    points = np.random.default_rng(3).permutation(points_of(terrain))
-    mixed = np.column_stack([points[:, 2], np.ones(len(points)), points[:, 1], points[:, 0]])
-    cloud = cloud_of(mixed, ("z", "intensity", "y", "x"))
-    cloud.row_step = 0  # not set: understood for one row
-    assert_same(terrain_from_point_cloud(cloud), terrain)
-    assert_same(terrain_from_point_cloud(cloud, 0.05), terrain)
+    if height == 1 and row_padding == 0:
+        cloud.row_step = 0  # not set: understood for one row
+        assert_same(terrain_from_point_cloud(cloud, 0.05), terrain)
 
 
 @pytest.mark.parametrize("height", [1, 7])
@@ -276,7 +271,6 @@ REFUSED = [
     (PointCloud2(), "no points"),
     (cloud_of(np.full((4, 3), np.nan)), "none of the cloud's 4 points"),
     (cloud_of(LINE), "at least 2 rows"),
-    (changed(0, name="height"), "no field x; "),
     (changed(2, name="n" * 1_000_000), "no field z; "),
     (changed(2, datatype=PointField.INT16), "field z has datatype INT16; it must be FLOAT32"),
     (changed(0, count=3), "field x has count 3"),

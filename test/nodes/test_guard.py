@@ -192,7 +192,7 @@ def test_one_that_flaps_is_told_once_a_second_at_most():
     assert 2 <= len(lines) <= 10
 
 
-def test_texts_that_differ_in_numbers_are_told_once_in_a_period_and_counted():
+def test_texts_that_differ_in_numbers_are_told_once_in_a_period_and_others_at_once():
     log = RepeatLog()
     lines = [
         log.line(f"it is {age:.3f} s old", 0.1 * age) for age in range(int(30 * REPEAT_PERIOD))
@@ -203,9 +203,4 @@ def test_texts_that_differ_in_numbers_are_told_once_in_a_period_and_counted():
         "it is 100.000 s old (99 more since the last line)",
         "it is 200.000 s old (99 more since the last line)",
     ]
-
-
-def test_another_reason_is_told_at_once():
-    log = RepeatLog()
     assert log.line("no frame 'odom'", 0.0) and log.line("no frame 'moon'", 0.0)
-    assert log.line("no frame 'odom'", 1.0) == ""
