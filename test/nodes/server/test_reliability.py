@@ -30,16 +30,11 @@ def nodes():
         yield opened
 
 
-@pytest.mark.parametrize(
-    ("budget", "half_length", "spacing", "busy"), [(5.0, 1.5, 0.05, 0), (1.0, 45.0, 0.001, 40)]
-)
-def test_fifty_questions_at_once_are_answered_or_refused_within_the_budget(
-    nodes, budget, half_length, spacing, busy
-):
-    ground = make_terrain(waves, half=half_length + 2.0)
-    nodes.start(SERVER, terrain_file=ground, time_budget=budget, waypoint_spacing=spacing)
+def test_fifty_questions_at_once_are_answered_or_refused_within_the_budget(nodes):
+    budget, ground = 1.0, make_terrain(waves, half=47.0)
+    nodes.start(SERVER, terrain_file=ground, time_budget=budget, waypoint_spacing=0.001)
     clients = [nodes.client(f"asker{k}").connect() for k in range(5)]
-    path = poses_path([(-half_length, 0.0, 0.0), (half_length, 0.0, 0.0)], "map")
+    path = poses_path([(-45.0, 0.0, 0.0), (45.0, 0.0, 0.0)], "map")
     clients[0].publish(path)
     wait_until(lambda: clients[0].check()["path_hash"] == path_hash(path), "the path", START_TIME)
     began = time.monotonic()
@@ -47,7 +42,7 @@ def test_fifty_questions_at_once_are_answered_or_refused_within_the_budget(
     messages = [finish(future, budget + 30.0).message for future in futures]
     assert time.monotonic() - began < budget + LATE
     codes = Counter(json.loads(message)["code"] or "traversable" for message in messages)
-    assert codes.keys() <= {"traversable", "busy", "too_long"} and codes["busy"] >= busy
+    assert codes.keys() <= {"traversable", "busy", "too_long"} and codes["busy"] >= 40
 
 
 def test_no_answer_is_lost_under_questions_without_a_pause(nodes):
