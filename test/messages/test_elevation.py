@@ -176,28 +176,22 @@ def test_several_points_in_a_cell_give_their_highest_mean_or_median(cell_height,
     assert terrain.elevation[0, 0] == expected and terrain.elevation[1, 1] == 0.0
 
 
-def test_the_lowest_friction_and_the_largest_deviation_of_a_cell_count():
+def test_the_lowest_friction_the_largest_deviation_and_the_class_of_most_points_count():
     points = [
-        [0.0, 0.0, 1.0, 0.9, 0.01],
-        [0.01, 0.0, 2.0, 0.4, 0.04],
-        [0.02, 0.0, 1.5, np.nan, 0.0],
-        [0.1, 0.0, 1.0, 0.8, 0.02],
-        [0.0, 0.1, 1.0, np.inf, 0.03],
-        [0.1, 0.1, 1.0, 0.7, 0.0],
+        [0.0, 0.0, 1.0, 0.9, 0.01, 1.0],
+        [0.01, 0.0, 2.0, 0.4, 0.04, 2.0],
+        [0.02, 0.0, 1.5, np.nan, 0.0, 7.0],
+        [0.03, 0.0, 1.5, 0.5, 0.0, 7.0],
+        [0.1, 0.0, 1.0, 0.8, 0.02, np.nan],
+        [0.11, 0.0, 1.0, 0.8, 0.02, -1.0],
+        [0.12, 0.0, 1.0, 0.8, 0.02, 4.0],
+        [0.0, 0.1, 1.0, np.inf, 0.03, np.nan],
+        [0.1, 0.1, 1.0, 0.7, 0.0, 0.0],
     ]
-    terrain = terrain_from_point_cloud(cloud_of(points, (*XYZ, "friction", "elevation_std")), 0.1)
+    names = (*XYZ, "friction", "elevation_std", "class")
+    terrain = terrain_from_point_cloud(cloud_of(points, names), 0.1)
     np.testing.assert_allclose(terrain.friction, [[0.4, 0.8], [np.nan, 0.7]])
     np.testing.assert_allclose(terrain.elevation_std, [[0.04, 0.02], [0.03, 0.0]])
-
-
-def test_the_class_of_most_points_of_a_cell_counts():
-    points = [
-        *([0.001 * k, 0.0, 1.0, number] for k, number in enumerate((1, 2, 2, 7, 7, 7))),
-        *([0.1 + 0.001 * k, 0.0, 1.0, number] for k, number in enumerate((np.nan, -1.0, 4, 4))),
-        [0.0, 0.1, 1.0, np.nan],
-        [0.1, 0.1, 1.0, 0.0],
-    ]
-    terrain = terrain_from_point_cloud(cloud_of(points, (*XYZ, "class")), 0.1)
     np.testing.assert_array_equal(terrain.ground_class, [[7.0, 4.0], [np.nan, 0.0]])
 
 
