@@ -133,25 +133,19 @@ def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(
     assert heard == [2]
 
 
-class Clock:
-    """The steady clock as the sender reads it; at first it stands, however late a thread is."""
-
-    def __init__(self):
-        self.now, self.stands = time.monotonic(), True
-
-    def monotonic(self) -> float:
-        self.now = self.now if self.stands else time.monotonic()
-        return self.now
-
-
 def test_a_few_responses_leave_at_once_and_many_in_groups(ros, busy, monkeypatch):
-    clock = Clock()
-    monkeypatch.setattr(deferred, "time", SimpleNamespace(monotonic=clock.monotonic))
+    reads = [time.monotonic()]
+
+    def read_clock() -> float:
+        if len(sent) >= AT_ONCE:  # it stands until then, however late a thread is
+            reads.append(time.monotonic())
+        return reads[-1]
+
+    monkeypatch.setattr(deferred, "time", SimpleNamespace(monotonic=read_clock))
     sender, sent = PacedSender(busy, Guard(busy.get_logger())), []
     for number in range(50):
-        sender.send(lambda number=number: sent.append((number, clock.now)))
+        sender.send(lambda number=number: sent.append((number, reads[-1])))
     assert [number for number, _ in sent] == list(range(AT_ONCE))
-    clock.stands = False
     ros.spin(busy)
     wait_until(lambda: len(sent) == 50, "all responses")
     assert [number for number, _ in sent] == list(range(50))
