@@ -5,18 +5,19 @@ import threading
 import time
 
 import pytest
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
+from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
-from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import topic_qos
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
@@ -98,10 +99,17 @@ class CountingExecutor(GuardedExecutor):
 
 
 def test_a_message_that_is_left_alone_ends_no_wait(ros):
-    node, heard = Node("hearer", context=ros.context), []
-    node.create_timer(1e6, lambda: None)
-    topics = PolledTopics(node, Guard(Lines()))
-    topics.subscribe(String, "maps", lambda *message: heard.append(message), topic_qos())
+    node = Fragile(ros.context)
+    node.timer.cancel()
+
+    class Unread(MutuallyExclusiveCallbackGroup):
+        def can_execute(self, entity):
+            return not isinstance(entity, Subscription) and super().can_execute(entity)
+
+    events = SubscriptionEventCallbacks(incompatible_qos=node.heard.append)
+    node.create_subscription(
+        String, "maps", node.heard.append, 10, callback_group=Unread(), event_callbacks=events
+    )
     speaker = ros.spin(Node("speaker", context=ros.context))
     maps = speaker.create_publisher(String, "maps", 10)
     wait_until(lambda: maps.get_subscription_count() > 0, "the subscription")
@@ -112,7 +120,7 @@ def test_a_message_that_is_left_alone_ends_no_wait(ros):
     end = time.monotonic() + 2.5
     while time.monotonic() < end:
         executor.spin_once(0.5)
-    assert not heard and 5 <= executor.wait_sets <= 25
+    assert not node.heard and 5 <= executor.wait_sets <= 25
     executor.shutdown()
     node.destroy_node()
 
