@@ -34,11 +34,11 @@ class Rig:
         if "cmd_vel" in names:
             service.take_command(self.speed, 0.0, self.now)
 
-    def run(self, seconds, *names, clock_fault=""):
+    def run(self, seconds, *names):
         for _ in range(round(seconds / PERIOD)):
             self.now += PERIOD
             self.send(names or INPUTS)
-            self.commands.append(self.supervisor.update(self.now, clock_fault))
+            self.commands.append(self.supervisor.update(self.now))
         return self.commands[-1]
 
 
@@ -133,15 +133,6 @@ def test_an_input_that_is_bad_every_other_time_is_one_fault():
             rig.run(PERIOD)
     assert [command.state for command in rig.commands] == ["driving"] + 99 * ["fault"]
     assert rig.run(RECOVERY_TIME + 0.1).state == "driving"
-
-
-def test_a_fault_found_elsewhere_is_taken_into_the_next_update():
-    rig = Rig()
-    rig.run(1.0)
-    rig.supervisor.trip("updates came too late")
-    assert rig.run(PERIOD).fault == "updates came too late"
-    assert rig.run(1.0).state == "driving"
-    assert rig.run(PERIOD, clock_fault="the clock was stepped back").state == "fault"
 
 
 def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_otherwise():
