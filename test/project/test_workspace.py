@@ -15,15 +15,12 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from support.project.checkout import TOP, console_scripts, copy_checkout
-from support.project.doc_blocks import read_blocks
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
 pytestmark = pytest.mark.long
 TOOLS = ("setuptools<80", "colcon-common-extensions")
 """colcon links by `setup.py develop --editable`, which setuptools 80 has dropped; Noble has 68."""
-WAIT_FOR_SERVER = "until ros2 node list | grep -q traverse_server; do sleep 1; done"
-"""The kernels compile first."""
 HOW = {"copied": (), "linked": ("--symlink-install",)}
 
 
@@ -119,19 +116,6 @@ def test_a_server_of_the_workspace_answers_its_mission_planner(workspace):
     """
     told = sourced(workspace, script)
     assert "traversable" in told and "not traversable" not in told
-
-
-@pytest.mark.skipif(shutil.which("ros2") is None, reason="no ros2 command, which PyPI lacks")
-@pytest.mark.parametrize("workspace", ["copied"], indirect=True)
-def test_the_ros2_command_does_what_readme_says(workspace):
-    blocks = read_blocks(TOP / "README.md")
-    one, two = (block.text for block in blocks if block.not_run == "needs the ros2 command")
-    script = f"({one}) > server.log 2>&1 & {WAIT_FOR_SERVER}\n{two}\nros2 daemon stop"
-    told = sourced(workspace, script)
-    assert "goal 1: yes" in told and "nav_msgs.srv.GetPlan_Response" in told
-    assert "message: traversable" in told and "label: wheel" in told
-    assert "Coulomb friction" in told and "Set parameter successful" in told
-    assert "/traverse_server/can_traverse: nav_msgs/srv/GetPlan" in told
 
 
 def test_colcon_test_runs_tests_of_the_package_and_keeps_their_results(workspace, python):
