@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, Terrain, judge_path, judge_paths
+from rover_physics.prediction import crossing
 from rover_physics.prediction.drops import FACE
 from support.grounds import make_terrain
 from support.paths import poses_at
+from support.predictions import assert_same
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import plane, smooth
+from support.rough_grounds import plane, rocky, smooth
 from support.rover_geometry import balance_residuals
 from support.rovers import LSR1
 
@@ -51,6 +53,15 @@ def test_without_an_edge_no_wheel_falls_and_smooth_ground_has_nothing_between_wa
     assert prediction.settled.all()
     assert not prediction.falling.any() and not prediction.wheel_drop.any()
     assert not is_smooth or len(prediction.between.poses) == 0
+
+
+def test_groups_and_little_space_change_nothing_of_what_is_found(monkeypatch):
+    asked = FREE, rocky(5), poses_at(np.linspace(-1.0, 1.0, 101))
+    whole = judge_path(*asked)[0].between
+    monkeypatch.setattr(crossing, "GROUP", 3)
+    monkeypatch.setattr(crossing, "POSES_IN_STRETCH", 1)
+    assert len(whole.poses) > 10
+    assert_same(judge_path(*asked)[0].between, whole)
 
 
 def test_a_wall_higher_than_the_wheel_is_climbed_through_contacts_near_90_degrees():

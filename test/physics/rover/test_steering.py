@@ -16,8 +16,6 @@ from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive, steer_w
 from rover_physics.rover.steering_joints import (
     can_turn_on_the_spot,
     check_joint_limit,
-    steered_wheels,
-    steering_joints,
     tightest_radius,
 )
 from support.rovers import ALL_STEER, FIXED, LSR1, M2020
@@ -88,14 +86,6 @@ def test_a_rover_turns_on_the_spot_if_its_wheels_reach_the_tangent():
 
 
 # Commands: the drive waits for wheels that steer
-
-
-def test_the_joints_are_those_of_the_steered_axles_in_wheel_order():
-    assert steering_joints(LSR1) == (
-        "rear_right_steering", "front_right_steering", "rear_left_steering", "front_left_steering",
-    )  # fmt: skip
-    assert steered_wheels(LSR1).tolist() == [0, 2, 3, 5]
-    assert steering_joints(FIXED) == ()
 
 
 def test_a_motion_beyond_the_limit_is_refused_by_wheel_and_angle():
