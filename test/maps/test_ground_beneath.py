@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, judge_path
+from rover_physics import judge_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
@@ -96,16 +96,6 @@ def test_the_margin_continues_the_ground_around_the_wheels():
     ]
     # The wheels' outline of lsr1 is 1.0 m x 0.7 m; interpolation needs 1.5 cells around it.
     assert areas[1] - areas[0] == pytest.approx(1.55 * 1.25 - 1.15 * 0.85, rel=0.05)
-
-
-def test_a_map_that_begins_ahead_of_the_rover_grows_to_where_it_stands():
-    ahead = Terrain(np.zeros((40, 40)), 0.05, (0.6, -1.0))
-    standing, _ = standing_at(LSR1, make_terrain(lambda x, y: 0.0 * x), (0.0, 0.0, 0.0))
-    living = LivingMap()
-    living.replace(ahead, "elevation_cloud", 1.0)
-    assert fill(living, standing)
-    terrain = living.snapshot().terrain
-    assert terrain.contains(-0.5, 0.0) and terrain.elevation_at(0.0, 0.0) == pytest.approx(0.0)
 
 
 def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():
