@@ -176,27 +176,24 @@ def test_the_highest_of_several_finer_cells_counts():
     assert cell(living, 0.8, 0.8)[0] == 0.5 and cell(living, 0.6, 0.8)[0] == 0.0
 
 
-def test_soil_and_friction_of_the_loaded_map_stay():
-    soil = np.ones(PRIOR.elevation.shape, np.int32)
-    prior = replace(
-        PRIOR, soil=soil, soil_names=("dry_sand", "loam"), friction=np.full(soil.shape, 0.4)
-    )
-    living = loaded(prior)
-    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1.0)
-    terrain = living.snapshot().terrain
-    assert terrain.soil_names == prior.soil_names and (terrain.soil == 1).all()
-    np.testing.assert_array_equal(terrain.friction, 0.4)
-
-
-def test_classes_stay_where_a_newer_map_has_none_and_the_most_frequent_of_finer_cells_counts():
-    living = loaded(replace(PRIOR, ground_class=np.full(PRIOR.elevation.shape, 2.0)))
+def test_soil_friction_and_classes_stay_where_a_newer_map_has_none():
+    shape = PRIOR.elevation.shape
+    known = {"soil": np.ones(shape, np.int32), "soil_names": ("dry_sand", "loam")}
+    known |= {"friction": np.full(shape, 0.4), "ground_class": np.full(shape, 2.0)}
+    living = loaded(replace(PRIOR, **known))
     local = local_map((0.0, 0.0), 0.1)
     classes = np.full(local.elevation.shape, np.nan)
     classes[0, 0] = 5.0
     living.merge(replace(local, ground_class=classes), TOPIC, 1.0)
     living.merge(local, TOPIC, 2.0)
-    found = living.snapshot().terrain.ground_class
+    terrain = living.snapshot().terrain
+    assert terrain.soil_names == known["soil_names"] and (terrain.soil == 1).all()
+    np.testing.assert_array_equal(terrain.friction, 0.4)
+    found = terrain.ground_class
     assert (found == 5.0).sum() == 1 and (found == 2.0).sum() == found.size - 1
+
+
+def test_the_most_frequent_class_of_finer_cells_counts():
     fine = np.zeros((8, 8))
     fine[:4, :2], fine[:4, 2:4], fine[0, 0] = 1.0, np.nan, 9.0
     ground = Terrain(np.zeros((8, 8)), 0.25, (-0.375, -0.375), ground_class=fine)
