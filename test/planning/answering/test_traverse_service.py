@@ -49,6 +49,16 @@ def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
     assert whole.classes == ()
 
 
+@pytest.mark.parametrize("planner", ["auto", "lattice"])
+def test_a_goal_off_the_map_has_a_way_to_the_frontier_if_that_is_wanted(planner):
+    wanted = {"planner": planner, "search_frontier": True, "lattice_cell": 0.25}
+    service = make_service(make_terrain(waves, 0.1, 2.0), search_budget=60.0, **wanted)
+    start, goal = (-1.0, 0.0, 0.0), (2.5, 0.0, 0.0)
+    judged = service.snapshot().answer(start, goal)
+    assert judged.traversable and 0.5 < judged.search.goal_offset < 1.5
+    assert service.snapshot().answer(goal, start).code in ("off_map", "unknown_ground")
+
+
 def friction_used(service):
     """Return the largest use of friction on a path."""
     service.given_path = GivenPath(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")

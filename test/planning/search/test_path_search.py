@@ -257,6 +257,15 @@ def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
     assert 1.0 < left < 1.7
 
 
+def test_a_way_to_the_frontier_is_none_to_the_goal_once_that_is_known():
+    """From the same start, the old way that ends far before the goal was the answer."""
+    unseen = ask(make_terrain(lambda x, y: np.where(x > 1.475, np.nan, waves(x, y))))
+    memory, to_frontier = EdgeMemory(), replace(LONG, frontier=True, ends_at_first=True)
+    find_path(unseen, to_frontier, memory)
+    answer = find_path(ask(make_terrain(waves)), to_frontier, memory)
+    np.testing.assert_allclose(answer.path.poses[-1], GOAL, atol=1e-9)
+
+
 def test_a_lattice_coarser_than_obstacles_is_warned_of():
     coarse = find_path(ask(make_terrain(waves)), replace(LONG, cell=0.5))
     assert "cell of 0.5 m is larger than 0.40 m" in coarse.warning
