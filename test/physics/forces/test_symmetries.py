@@ -9,15 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, Terrain, judge_poses
-from support.rough_grounds import plane, random_poses, rocky, scaled_for, smooth
+from support.rough_grounds import random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import ANGLE, GAP, turned_round
 from support.rovers import FIXED, LSR1, M2020
 
 SWAP = [3, 4, 5, 0, 1, 2]
 ROUND = [5, 4, 3, 2, 1, 0]
 AHEAD = np.zeros(4)
-ARM = {"arm_yaw": 0.0, "arm_shoulder": 0.0, "arm_elbow": 0.0}
-EQUAL, SERVO = SweepOptions(), SweepOptions(policy="servo")
+SERVO = SweepOptions(policy="servo")
 seeds = st.integers(0, 10_000)
 few = settings(max_examples=12)
 
@@ -38,21 +37,14 @@ def mirrored(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
     return flipped, poses * [1.0, -1.0, -1.0]
 
 
-def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torques=2e-3) -> int:
+def assert_mirrored(rover, ground, poses, curvature, options, torques=2e-3) -> int:
     """Compare answers on mirrored grounds; return how many poses settle and drive.
 
-    Forces agree within `loads` [weights], torques within `torques` [N m].
+    Torques agree within `torques` [N m].
     """
     bends = np.full(len(poses), curvature)
-    other = options
-    if options.tool_force is not None:
-        other = replace(
-            options,
-            tool_force=np.array(options.tool_force) * [1.0, -1.0, 1.0],
-            tool_moment=np.array(options.tool_moment) * [-1.0, 1.0, -1.0],
-        )
     here = judge_poses(rover, ground, poses, bends, options)[0]
-    there = judge_poses(rover, *mirrored(ground, poses), -bends, other)[0]
+    there = judge_poses(rover, *mirrored(ground, poses), -bends, options)[0]
     assert there.status.tolist() == here.status.tolist()
     rows = here.settled
     if options.policy == "servo":
@@ -65,8 +57,8 @@ def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torque
         ("rocker_angle", here.rocker_angle[:, ::-1], ANGLE),
         ("bogie_angle", here.bogie_angle[:, ::-1], ANGLE),
         ("wheel_centres", here.wheel_centres[:, SWAP] * flipped, ANGLE),
-        ("wheel_loads", here.wheel_loads[:, SWAP], loads * rover.weight),
-        ("lateral", -here.lateral[:, SWAP], loads * rover.weight),
+        ("wheel_loads", here.wheel_loads[:, SWAP], 1e-3 * rover.weight),
+        ("lateral", -here.lateral[:, SWAP], 1e-3 * rover.weight),
         ("torque", here.torque[:, SWAP], torques),
         ("tip_over_ratio", here.tip_over_ratio, 1e-4),
         ("tip_over_force_angle", here.tip_over_force_angle, 1e-4),
@@ -79,15 +71,10 @@ def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torque
 
 
 @few
-@given(seeds, st.sampled_from([0.0, 0.7, np.inf]), st.booleans(), st.data())
-def test_mirrored_ground_swaps_right_and_left(seed, curvature, loaded, data):
-    ground, options, loads = smooth(seed), EQUAL, 1e-3
-    if loaded:
-        force, moment = (data.draw(st.tuples(*[st.floats(-8.0, 8.0)] * 3)) for _ in range(2))
-        options = SweepOptions(joint_angles=ARM, tool_force=force, tool_moment=moment)
-        ground, loads = plane(0.1, data.draw(st.floats(-0.2, 0.2)), half=2.0), 1e-5
+@given(seeds, st.sampled_from([0.0, 0.7, np.inf]))
+def test_mirrored_ground_swaps_right_and_left(seed, curvature):
     poses = random_poses(seed, 4, 0.6)
-    assert assert_mirrored(LSR1, ground, poses, curvature, options, loads) == 4
+    assert assert_mirrored(LSR1, smooth(seed), poses, curvature, SweepOptions()) == 4
 
 
 @pytest.mark.parametrize("curvature", [0.5, np.inf])

@@ -129,27 +129,6 @@ def test_a_torque_limit_that_no_wheel_comes_near_does_not_matter(factor):
     )
 
 
-@few
-@given(
-    st.integers(0, 19),
-    st.sampled_from([
-        (rocky, {}), (rocky, {"tool_force": (-25.0, 0.0, 8.0)}), (smooth, {"soil": "dry_sand"}),
-        (smooth, {"soil": "lunar_nominal"}),
-    ]),
-)  # fmt: skip
-def test_optimal_torques_never_use_more_friction_than_equal_ones(seed, asked):
-    make, options = asked
-    ground, poses = make(seed), random_poses(seed, 20, 1.8 if make is rocky else 0.6)
-    equal, optimal = (
-        judge_path(LSR1, ground, poses, SweepOptions(policy=policy, **options))[0]
-        for policy in ("equal", "optimal")
-    )
-    within = (equal.torque_saturation.max(axis=1) <= 1.0) & (equal.wheel_loads.min(axis=1) > 0.0)
-    most, least = (p.friction_utilisation.max(axis=1)[within] for p in (equal, optimal))
-    assert within.any()
-    assert (least <= most * (1.0 + 1e-4) + 1e-6).all()
-
-
 def range_by_program(prediction, i, wheel, max_torque, shared, share):
     """Return the range [N m] of a wheel's torque by linear programs, with a share of friction."""
     cost = np.eye(12)[6 + wheel]

@@ -232,17 +232,6 @@ def test_a_path_that_stops_at_its_failure_and_a_long_one_judge_turns_too():
     assert stopped.reasons == in_parts.verdict().reasons == verdict.reasons
 
 
-@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
-def test_within_a_long_turn_no_wheel_goes_farther_than_a_quarter_of_its_radius(rover):
-    prediction, verdict = judge_path(rover, LEVEL, HALF_TURN)
-    between = prediction.between
-    assert verdict.traversable
-    yaw = np.concatenate([[0.0], np.unwrap(between.poses[:, 2]), [-np.pi]])
-    reach = max(np.hypot(x, y) for x, y, _ in rover.suspension.wheels.values())
-    assert np.abs(np.diff(yaw)).max() * reach <= 0.25 * rover.wheel.radius * (1.0 + 1e-9)
-    assert not between.poses[:, :2].any()
-
-
 def test_the_drift_of_fixed_wheels_in_a_turn_is_that_of_dense_waypoints():
     coarse, fine = (
         judge_path(FIXED, plane(0.15, 0.0, half=3.0), path, SweepOptions("servo"))[0]
