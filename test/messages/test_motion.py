@@ -80,7 +80,7 @@ MAST = "in frame 'mast'.*imu_frame and imu_mounting"
         (read_odometry, odometry("mast"), "is of frame 'mast'; it must be of 'base_li"),
         (check_transform, transform(x=NAN), TRANSFORM),
         (check_transform, transform(length=2.0), TRANSFORM),
-        (check_transform, transform(child=""), TRANSFORM),
+        *[(check_transform, transform(child=child), TRANSFORM) for child in ("", "map")],
         (twist_to_speeds, Twist(linear=Vector3(x=NAN)), "both must be finite"),
         (read_target, make_target(frame="odom"), "tool target is in frame 'odom'"),
         (read_target, make_target(frame=""), "without a frame_id"),

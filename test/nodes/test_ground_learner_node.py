@@ -24,7 +24,7 @@ from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
 from rover_planner.nodes import ground_learner
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
-from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
 from support.learning_drives import climb, ramp
 from support.messages import row_messages
 from support.ros_fixtures import RosRun, hear
@@ -47,7 +47,7 @@ class Rover(Node):
         kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
         self.senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
         self.estimates = hear(self, String, ground_learner.ESTIMATE, latched_qos())
-        self.wheels = hear(self, Odometry, "ground_learner/odometry", sensor_qos())
+        self.wheels = hear(self, Odometry, "ground_learner/odometry", topic_qos())
         self.marks = hear(self, String, ground_learner.MARK_PLACE, latched_qos())
         self.stops = hear(self, Bool, ground_learner.EMERGENCY_STOP, latched_qos())
 

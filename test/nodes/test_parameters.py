@@ -58,6 +58,7 @@ def test_defaults_are_of_the_type_of_their_field_and_allowed(table):
         ("candidate_count", 0, "candidate_count is 0; it must be in 1 to 99"),
         ("waypoint_spacing", 1.1, r"waypoint_spacing is 1.1; it must be in 0 to 1 m"),
         ("waypoint_spacing", 0.0009, r"it must be 0, or at least 0\.001 m"),
+        ("monitor_offset", 0.009, r"it must be 0, or at least 0\.01 m"),
         ("policy", "fair", "policy is 'fair'; it must be one of equal, servo, optimal"),
         ("map_frame", "", "map_frame is empty; it must be a text such as 'map'"),
         ("joint_map", ("a", ""), r"joint_map is \['a', ''\]; it must hold texts"),
