@@ -23,6 +23,7 @@ HEIGHTS[2, 3] = HEIGHTS[0, 1] = np.nan
 
 def test_heights_ascend_along_x_and_y_from_the_cell_of_smallest_x_and_y():
     message = grid_map_of({"elevation": HEIGHTS}, 0.5, centre=(10.0, -4.0))
+    message.info.pose.orientation.w = 0.0  # all zeros: not set, and taken as unturned
     terrain = terrain_from_grid_map(message)
     np.testing.assert_array_equal(terrain.elevation, HEIGHTS)
     # 5 columns along x and 7 rows along y, around the centre
@@ -66,12 +67,6 @@ def test_a_cell_that_a_basic_layer_or_the_variance_lacks_is_unknown():
     expected = np.isnan(HEIGHTS)
     expected[4, 4] = expected[5, 0] = True
     np.testing.assert_array_equal(np.isnan(terrain.elevation), expected)
-
-
-def test_an_orientation_of_zeros_is_not_set_and_taken_as_unturned():
-    message = grid_map_of({"elevation": HEIGHTS})
-    message.info.pose.orientation.w = 0.0
-    np.testing.assert_array_equal(terrain_from_grid_map(message).elevation, HEIGHTS)
 
 
 TURN = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)

@@ -43,7 +43,7 @@ from rover_planner.planning.path_query import (
     Pose,
     answer_path_query,
     check_path,
-    choose,
+    choose_by_chance,
 )
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 from rover_planner.planning.search.unobserved_check import UnobservedCheck, physical
@@ -125,7 +125,12 @@ class PathJudge:
         """
         if not answer.traversable:
             return answer
-        held = choose(tuple(self._hold_path(candidate) for candidate in answer.candidates))
+        held = choose_by_chance(
+            self.rover,
+            self.terrain,
+            [self._hold_path(candidate) for candidate in answer.candidates],
+            self.options,
+        )
         return held if held.traversable else replace(held, nearest=answer.nearest)
 
     def _hold_path(self, candidate: Candidate) -> Candidate:

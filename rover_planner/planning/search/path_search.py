@@ -359,7 +359,8 @@ class _PathFinder:
         smoothed = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
         if not smoothed.verdict.traversable:
             smoothed, pieces = best, progress.pieces
-        self._memory.keep_path(self._query, pieces)
+        if not self._to_frontier:  # it ends before the goal
+            self._memory.keep_path(self._query, pieces)
         return smoothed, sum(one.cost for one in pieces)
 
     def _make_result(

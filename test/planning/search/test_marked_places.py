@@ -47,6 +47,7 @@ def test_an_answer_leads_around_a_marked_place_until_it_is_cleared(service):
     assert judged.traversable, judged.reason
     away = np.hypot(judged.candidate.poses[:, 0] - PLACE.x, judged.candidate.poses[:, 1])
     assert away.min() >= PLACE.radius
+    assert judged.candidate.verdict.failure_chance == 0.0  # it is asked of this path, too
     service.marked = NONE_MARKED
     assert np.abs(service.snapshot().answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
 
