@@ -16,7 +16,7 @@ from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
 from support.grounds import make_terrain, raised, rocky, wall_at, waves
 from support.rough_grounds import with_std
-from support.services import load_settings, make_service
+from support.services import make_service
 
 FAN = {"planner": "fan", "candidate_count": 1}
 """Parameters of a service that does not search."""
@@ -32,7 +32,7 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
     assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
-    service.settings = load_settings(map_sigmas=0.0, **FAN)
+    service.settings = make_service(map_sigmas=0.0, **FAN).settings
     passed = service.snapshot().answer(start, goal).report.to_dict()
     assert passed["traversable"] and passed["map_sigmas"] == 0.0
     assert passed["friction_utilisation_bound"] is None
@@ -99,7 +99,7 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
 
     def used_on(number, **layers):
         service = make_service(replace(flat, ground_class=number + 0.0 * numbers, **layers))
-        service.settings = load_settings(learn="use")
+        service.settings = make_service(learn="use").settings
         service.take_ground(ground)
         return service, friction_used(service)
 
@@ -113,17 +113,17 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     assert used_on(np.nan)[1] == pytest.approx(0.8 / 0.5 * told, rel=1e-6)
     own = np.full(flat.elevation.shape, 0.6)
     assert used_on(1, friction=own)[1] == pytest.approx(0.8 / 0.6 * told, rel=1e-6)
-    service.settings = load_settings()
+    service.settings = make_service().settings
     assert friction_used(service) == pytest.approx(told, rel=1e-6)
 
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     service = make_service(raised(make_terrain(waves), (80, 80), np.nan))
     assert np.isnan(service.terrain.elevation[80, 80])
-    service.settings = load_settings(unknown_cells="interpolate")
+    service.settings = make_service(unknown_cells="interpolate").settings
     service.refresh_map()
     assert np.isfinite(service.terrain.elevation[80, 80])
-    service.settings = load_settings()
+    service.settings = make_service().settings
     service.refresh_map()
     assert np.isnan(service.terrain.elevation[80, 80])
 
