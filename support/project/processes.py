@@ -4,9 +4,10 @@
 import contextlib
 import os
 import signal
-import time
 import uuid
 from pathlib import Path
+
+from support.waiting import wait_until
 
 _NAME = "ROVER_PLANNER_TEST_RUN"
 
@@ -30,9 +31,8 @@ class ProcessToken:
 
     def wait_until_gone(self, seconds: float = 10.0) -> list[int]:
         """Wait until no process is left; return those that are left in the end."""
-        deadline = time.monotonic() + seconds
-        while self.find() and time.monotonic() < deadline:
-            time.sleep(0.1)
+        with contextlib.suppress(AssertionError):
+            wait_until(lambda: not self.find(), "the end of all processes", seconds)
         return self.find()
 
     def kill(self) -> None:

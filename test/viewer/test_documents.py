@@ -207,15 +207,11 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
     np.testing.assert_allclose(there.wheel_loads, failure.state.wheel_loads)
     places = prediction.between.position[prediction.between.waypoint == first]
     assert np.isclose(places, failure.state.position).all(axis=1).any()
-
-
-def test_of_several_states_at_the_place_of_a_failure_that_which_fails_is_shown():
-    path = judged_on(stepped, friction=0.4)
-    prediction, failure = path.prediction, path.failure
+    # Of two states at one place, as where a wheel rolls off an edge, the one that fails is shown.
     between = prediction.between
-    again = between.select([*range(len(between.poses)), 0])  # as where a wheel rolls off an edge
+    again = between.select([*range(len(between.poses)), 0])
     poses = np.vstack([between.poses, failure.state.here.poses])
-    waypoints = np.append(between.waypoint, path.verdict.first_failure)
+    waypoints = np.append(between.waypoint, first)
     again = replace(again, poses=poses, waypoint=waypoints)
     twin = replace(path, prediction=replace(prediction, between=again))
     assert twin.failure.headline == failure.headline
