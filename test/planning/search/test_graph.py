@@ -6,9 +6,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from rover_physics import load_rover
-from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty, difficulty_of
+from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty
 from rover_planner.planning.search.edges import FAILS, PASSES, Edges
-from rover_planner.planning.search.graph import PRICE, Seeds, ShortestPaths
+from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.primitives import make_primitives
 
@@ -38,18 +38,6 @@ def hardness(rng):
     return Difficulty(*level, steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples, unseen)
 
 
-def cost_of(graph, node, k, end):
-    """Return the cost of an edge that is not refused."""
-    least = graph.least_cost[node % 16, k]
-    if graph.state[node, k] == PASSES:
-        return graph.cost[node, k]
-    if graph.caution == 0.0:
-        return least
-    difficulty = difficulty_of(graph.difficulty, graph.columns, node, k)
-    dear = PRICE * graph.difficulty.cell * difficulty
-    return least + graph.caution * (least * graph.doubt[end] + dear)
-
-
 def explicit_costs(known, graph):
     """Return the matrix of the costs of all edges that are not refused."""
     best, shape = {}, EDGES.nodes.shape
@@ -62,7 +50,7 @@ def explicit_costs(known, graph):
                 continue
             end = (y * shape[1] + x) * 16 + primitive.end_heading
             if known.state[node, k] < FAILS and known.standing[end] < FAILS:
-                cost = cost_of(graph, node, k, end)
+                cost = edge_cost(graph, node, k, end)
                 best[node, end] = min(cost, best.get((node, end), np.inf))
     ends = np.array(list(best), int).reshape(-1, 2)
     return csr_array((list(best.values()), tuple(ends.T)), shape=2 * (EDGES.nodes.count,))
@@ -98,7 +86,7 @@ def learn_of(route, known, search, rng):
     judged = route.edges[rng.random(len(route.edges)) < 0.5]
     ends = EDGES.ends(judged)
     for edge, end in zip(judged, ends, strict=True):
-        estimate = cost_of(graph, *divmod(edge, EDGES.width), end)
+        estimate = edge_cost(graph, *divmod(int(edge), EDGES.width), end)
         known.cost.flat[edge] = estimate * (1.0 + 0.2 * rng.random())
         known.state.flat[edge] = rng.choice([PASSES, PASSES, FAILS])
     beside = NODES.around(EDGES.ends(route.edges))
