@@ -18,6 +18,7 @@ from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, waves
+from support.paths import arc_of
 from support.rough_grounds import enlarged, plane, rocky
 from support.rovers import FIXED, LSR1, similar
 
@@ -287,12 +288,6 @@ LOOK_AHEAD = 0.4
 REACH = float(np.hypot(0.4, 0.31))
 
 
-def arc(radius, angle):
-    turned = np.linspace(0.0, angle, 100)
-    x, y = radius * np.sin(turned), radius * (1.0 - np.cos(turned))
-    return np.column_stack([x, y, turned])
-
-
 def turn_and_go(angle, length):
     spot = line((0.0, 0.0), (0.0, 0.0), np.linspace(0.0, angle, 40), 40)
     end = length * np.cos(angle), length * np.sin(angle)
@@ -314,7 +309,7 @@ def drive_along(plant, path):
 @pytest.mark.parametrize(("engine", "side"), [(QuasiStaticPlant, 1.0), (MujocoRover, -1.0)])
 def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
     plant = engine(LSR1, LEVEL, (0.0, 0.0, 0.0))
-    path = arc(side * 1.2, side * 0.6)
+    path = arc_of(side / 1.2, np.linspace(0.0, 0.72, 100))
     away, poses, states = drive_along(plant, path)
     assert away < 0.02
     assert poses[-1][:2] == pytest.approx(path[-1, :2], abs=0.25 * LOOK_AHEAD + 0.01)
@@ -356,7 +351,7 @@ def test_fixed_wheels_have_no_steering_joints_and_skid_in_curves(engine):
 
 def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
     plant = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0))
-    back = np.array([1.0, 0.0, 0.0]) + arc(-1.0, 0.8)  # to the right
+    back = np.array([1.0, 0.0, 0.0]) + arc_of(-1.0, np.linspace(0.0, -0.8, 100))  # to the right
     path = np.vstack([line((0.0, 0.0), (1.0, 0.0), 0.0), back[1:]])
     away, poses, _ = drive_along(plant, path)
     assert away < 0.1
