@@ -19,6 +19,7 @@ from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
+from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
 from support.grounds import make_terrain, rock_left
 from support.rough_grounds import enlarged
@@ -104,6 +105,18 @@ def test_a_path_around_is_searched(monkeypatch):
     around = case.judge().path_around
     assert around is not None and replace(case, poses=around).judge().passes
     np.testing.assert_allclose(around[[0, -1]], STRAIGHT[[0, -1]], atol=1e-9)
+
+
+def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):
+    """The path was told to be traversable as it is."""
+    place = MarkedPlace(0.3, 0.0, 0.2, "stuck", "today")
+    monkeypatch.setattr(seek, "LEVERS", [one for one in LEVERS if one.name in ("policy", "shift")])
+    level = make_terrain(lambda x, y: 0.0 * x, half=2.6)
+    *_, advice = grow_advice(Case(LSR1, level, STRAIGHT, marked=MarkedPlaces((place,))))
+    assert advice.judged.verdict.code == MARKED_CODE
+    (shift,) = advice.remedies
+    x, y, _ = shift.judged.case.poses.T
+    assert np.hypot(x - place.x, y - place.y).min() >= place.radius
 
 
 def test_words_say_what_to_do_and_what_it_does_to_the_rover():
