@@ -4,11 +4,13 @@
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, judge_path
+from rover_physics import judge_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.maps.living_map import LivingMap
+from rover_planner.maps.map_keeper import MapKeeper
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from support.grounds import make_terrain, raised, rocky, waves
 from support.rough_grounds import with_std
 from support.rovers import LSR1, M2020
@@ -98,14 +100,13 @@ def test_the_margin_continues_the_ground_around_the_wheels():
     assert areas[1] - areas[0] == pytest.approx(1.55 * 1.25 - 1.15 * 0.85, rel=0.05)
 
 
-def test_a_map_that_begins_ahead_of_the_rover_grows_to_where_it_stands():
-    ahead = Terrain(np.zeros((40, 40)), 0.05, (0.6, -1.0))
-    standing, _ = standing_at(LSR1, make_terrain(lambda x, y: 0.0 * x), (0.0, 0.0, 0.0))
-    living = LivingMap()
-    living.replace(ahead, "elevation_cloud", 1.0)
-    assert fill(living, standing)
-    terrain = living.snapshot().terrain
-    assert terrain.contains(-0.5, 0.0) and terrain.elevation_at(0.0, 0.0) == pytest.approx(0.0)
+def test_where_the_rover_drove_on_to_its_ground_has_no_margin():
+    keeper = MapKeeper(LSR1, TraverseServerParameters(footprint_margin=0.2))
+    start, further = (standing_at(LSR1, SLOPE, (x, 0.0, 0.0))[0] for x in (-2.0, -0.5))
+    first = keeper.take(blind_behind(SLOPE, 0.8), "elevation_cloud", 1.0, start)
+    then = keeper.fill(further, 2.0)
+    filled_at, both = (one.sources.count()["footprint"] for one in (first, then))
+    assert both - filled_at < 0.6 * filled_at
 
 
 def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():

@@ -82,19 +82,11 @@ def test_a_pose_has_the_class_that_a_path_there_would_have(kind, name):
     assert len(set(found.tolist())) >= 3
 
 
-def test_threads_change_no_class_and_questions_can_go_first_every_256_poses():
+def test_questions_can_go_first_every_256_poses():
     on_map, poses, looked = RoverOnMap(LSR1, rough(1), OPTIONS), poses_of(rough(1), 2000), []
-    few = [classify_poses(on_map, poses[k : k + 500]) for k in range(0, 2000, 500)]
     with interruptible(lambda: looked.append(None)):
-        whole = classify_poses(on_map, poses)
-    np.testing.assert_array_equal(whole, np.concatenate(few))
-    assert len(looked) >= 2000 // 256
-
-    def stop():
-        raise InterruptedError
-
-    with pytest.raises(InterruptedError), interruptible(stop):
         classify_poses(on_map, poses)
+    assert len(looked) >= 2000 // 256
 
 
 @pytest.mark.parametrize("excess", [-2e-9, -2e-10, 2e-9])

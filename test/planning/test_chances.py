@@ -12,7 +12,6 @@ from rover_planner.planning.search.path_search import FOUND, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.rough_grounds import plane
 from support.rovers import LSR1
-from support.services import load_settings
 
 START, GOAL = (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0)
 LONG = LatticeSettings(budget=60.0, cell=0.3)
@@ -58,8 +57,3 @@ def test_a_search_goes_around_what_may_fail_if_the_weight_of_chances_pays_for_it
     path, chance = answer.path, answer.report()["failure_chance"]
     assert answer.outcome == FOUND and path.verdict.failure_chance == chance < 0.05
     assert np.abs(path.poses[:, 1]).max() > 0.5 and path.length > straight.length + 0.1
-
-
-@pytest.mark.parametrize(("parameters", "accepted"), [({}, 0.05), ({"accepted_chance": 0.1}, 0.1)])
-def test_a_server_accepts_one_failure_of_twenty_unless_told_otherwise(parameters, accepted):
-    assert load_settings(**parameters).query.accepted_chance == accepted

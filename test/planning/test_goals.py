@@ -24,18 +24,6 @@ def by_intent(mission):
     return {goal.intent: goal.pose for goal in mission.goals}
 
 
-def test_start_and_plain_goals_stand_on_known_ground(holed):
-    mission = choose_mission(holed, LSR1)
-    plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
-    assert len(plain) >= 2
-    for x, y, _ in [mission.start, *plain]:
-        turn = np.linspace(0, 2 * np.pi, 20)
-        radius = 0.5 * footprint_radius(LSR1)
-        assert np.isfinite(
-            holed.elevation_at(x + radius * np.cos(turn), y + radius * np.sin(turn))
-        ).all()
-
-
 def test_hard_goals_are_what_they_say(holed):
     places = by_intent(choose_mission(holed, LSR1))
     assert not holed.contains(*places["off the map"][:2])
@@ -45,14 +33,18 @@ def test_hard_goals_are_what_they_say(holed):
     assert np.isfinite(holed.elevation_at(*places["steep"][:2]))
 
 
-def test_no_plain_goal_is_beside_the_start_and_all_ground_to_the_rough_one_is_known():
-    spirit = load_terrain("spirit").fill_gaps(0.2)
+def test_start_and_plain_goals_stand_apart_on_known_ground_as_all_is_to_the_rough_one():
+    spirit, turn = load_terrain("spirit").fill_gaps(0.2), np.linspace(0.0, 2.0 * np.pi, 20)
+    around = 0.5 * footprint_radius(LSR1)
     for seed in (1, 2):
         mission = choose_mission(spirit, LSR1, seed)
         line = np.linspace(mission.start[:2], by_intent(mission)["rough"][:2], 200)
         assert np.isfinite(spirit.elevation_at(line[:, 0], line[:, 1])).all()
         plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
         assert len(plain) >= 2
+        for x, y, _ in (mission.start, *plain):
+            beneath = spirit.elevation_at(x + around * np.cos(turn), y + around * np.sin(turn))
+            assert np.isfinite(beneath).all()
         away = [math.hypot(x - mission.start[0], y - mission.start[1]) for x, y, _ in plain]
         assert min(away) > 2.0 * footprint_radius(LSR1)
 

@@ -118,19 +118,6 @@ def test_workers_do_not_see_ctrl_c_which_a_terminal_sends_to_all():
     assert not blocks_ctrl_c()
 
 
-def test_a_killed_worker_costs_only_its_chunks_time(whole, tmp_path):
-    map_file, layers = whole
-    out = tmp_path / "out"
-    process = start("rover_planner", "survey", "lsr1", map_file, out, *SHARED)
-    try:
-        wait_for_a_chunk(out)
-        os.kill(children_of(process.pid)[0], signal.SIGKILL)
-        assert finish(process)["chunks_done"] == 9
-    finally:
-        process.kill()
-    assert_same_bits(layers_of(SurveyStore(out)), layers)
-
-
 def test_a_chunk_of_which_workers_die_is_named_and_the_rest_stands(tmp_path):
     prepared = prepare_here(tmp_path, make_rough_map(120, 120), make_request(), chunk=64)
     settings = ClusterSettings(workers=1)

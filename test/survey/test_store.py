@@ -132,19 +132,6 @@ def test_two_commands_do_not_write_into_one_store(files):
         pass
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"headings": 0}, "headings is 0; it must be 1 to 64"),
-        ({"headings": 65}, "headings is 65"),
-        ({"step": 0}, "step is 0; it must be 1 to 10000"),
-    ],
-)
-def test_impossible_numbers_are_refused(changes, said):
-    with pytest.raises(PlanningError, match=said):
-        make_request(**changes)
-
-
 def test_filled_gaps_are_another_map(files):
     store = prepare(files, max_gap=0.3).store
     box = slice(0, 70), slice(0, 70)

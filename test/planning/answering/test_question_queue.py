@@ -95,12 +95,6 @@ def work_on(budget: Budget) -> None:
         time.sleep(0.001)
 
 
-def test_answers_come_in_the_order_of_the_questions(desk):
-    for k in range(20):
-        desk.ask(str(k), lambda _, k=k: k)
-    assert desk.wait(20) == [(str(k), k) for k in range(20)]
-
-
 def test_a_sweep_stops_at_the_deadline_of_its_question(desk):
     rover, ground = load_rover("lsr1"), make_terrain(waves)
     poses = np.zeros((2_000_000, 3))

@@ -51,18 +51,13 @@ def around():
     return question, find_path(question, LONG, memory), memory
 
 
-def test_a_way_leads_around_a_wall_that_refuses_all_candidates(around):
+def test_a_way_that_passes_leads_to_the_goal_around_a_wall_that_refuses_all_candidates(around):
     question, answer, _ = around
-    fan = answer_path_query(LSR1, question.terrain, START, GOAL, OPTIONS)
-    assert not fan.traversable
+    assert not answer_path_query(LSR1, question.terrain, START, GOAL, OPTIONS).traversable
     assert answer.outcome == FOUND and not answer.reason
-    assert answer.path.poses[:, 1].max() > 2.0
     assert 0.0 < answer.seconds_first <= answer.seconds < 60.0
-
-
-def test_the_way_passes_as_any_path_does_and_ends_where_it_was_asked_to(around):
-    question, answer, _ = around
     poses = answer.path.poses
+    assert poses[:, 1].max() > 2.0
     np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-12)
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= OPTIONS.waypoint_spacing + 1e-9
     _, verdict = judge_path(LSR1, question.terrain, poses, OPTIONS.model)

@@ -6,14 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, judge_path, load_rover
+from rover_physics import judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.traction.balance import BalanceWriter
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.planning.angles import wrap
 from rover_planner.simulator import range_sensor
-from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -103,17 +101,6 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
     assert pull(plant, 1.0, needed) == pytest.approx(-1.0, abs=1e-3)
     high = pull(plant, 1.0, 1.3 * needed)
     assert high > -0.99 and pull(plant, 2.0, 0.5 * needed) < high
-
-
-def test_across_a_slope_no_wheel_slides_before_all_do():
-    slope, friction = 0.53, 0.6
-    asked = SweepOptions(friction=friction)
-    here = judge_path(LSR1, plane(0.0, slope, half=3.0), np.zeros((1, 3)), asked)[0]
-    forces = find_driving_forces(
-        BalanceWriter(LSR1), LSR1.wheel.radius, here, np.full(6, 0.02), direction=1.0
-    )
-    assert not forces.sliding.any()
-    assert forces.utilisation == pytest.approx(np.full(6, slope / friction), rel=0.05)
 
 
 @ENGINES
@@ -290,42 +277,8 @@ def test_a_wall_hides_what_is_behind_it_unless_nothing_hides():
     assert np.isfinite(look(ground, occlusion=False).elevation_at(1.5, 0.0))
 
 
-def follow(path, start, speed=0.05, step=0.2, most=4000):
-    """Return the poses (n, 3) of a rover that follows a path, and the commands (n, 2)."""
-    follower, pose = PathFollower(path, 0.3, 0.5), np.array(start, float)
-    poses, commands = [pose.copy()], []
-    for _ in range(most):
-        v, rate = follower.steer(pose, speed)
-        if follower.has_arrived(pose):
-            return np.array(poses), np.array(commands)
-        pose += step * np.array([v * np.cos(pose[2]), v * np.sin(pose[2]), rate])
-        pose[2] = wrap(pose[2])
-        poses.append(pose.copy()), commands.append((v, rate))
-    raise AssertionError(f"did not arrive; it is at {pose}")
-
-
 def line(start, end, yaw, count=30):
     return np.column_stack([np.linspace(start, end, count), np.full(count, yaw)])
-
-
-def test_a_path_driven_backwards_is_followed_backwards_from_beside_it():
-    yaw = 2.0
-    heading = np.array([np.cos(yaw), np.sin(yaw)])
-    aside = 0.1 * np.array([-heading[1], heading[0]])
-    poses, commands = follow(line((0.0, 0.0), -2.0 * heading, yaw), [*aside, yaw])
-    assert (commands[:-1, 0] < 0.0).all()
-    assert np.hypot(*(poses[-1, :2] + 2.0 * heading)) < 0.1
-    assert abs(aside @ poses[-1, :2]) < 0.1 * 0.03
-
-
-def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
-    back = np.array([1.0, 0.0, 0.0]) + arc(-1.0, 0.8)  # to the right
-    path = np.vstack([line((0.0, 0.0), (1.0, 0.0), 0.0), back[1:]])
-    poses, commands = follow(path, (0.0, 0.0, 0.0))
-    gears = np.sign(commands[:, 0])
-    assert np.count_nonzero(np.diff(gears)) == 1 and gears[0] > 0.0 > gears[-1]
-    assert poses[:, 0].max() == pytest.approx(1.0, abs=0.08)
-    assert np.hypot(*(poses[-1, :2] - path[-1, :2])) < 0.1
 
 
 # Wheels that steer
@@ -401,10 +354,23 @@ def test_fixed_wheels_have_no_steering_joints_and_skid_in_curves(engine):
 
 
 def test_a_turn_by_more_than_half_a_circle_goes_the_way_of_the_path():
+    plant = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0))
     path = line((0.0, 0.0), (0.0, 0.0), wrap(np.linspace(0.0, 4.0, 60)), 60)
-    _, commands = follow(path, (0.0, 0.0, 0.0), SPEED, 0.1)
-    assert (commands[:, 0] == 0.0).all() and (commands[:, 1] > 0.0).all()
-    assert 0.1 * commands[:, 1].sum() == pytest.approx(4.0, abs=0.02)
+    _, poses, _ = drive_along(plant, path)
+    turned = np.unwrap(poses[:, 2])
+    assert (np.diff(turned) >= 0.0).all() and turned[-1] == pytest.approx(4.0, abs=0.03)
+
+
+def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
+    plant = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0))
+    back = np.array([1.0, 0.0, 0.0]) + arc(-1.0, 0.8)  # to the right
+    path = np.vstack([line((0.0, 0.0), (1.0, 0.0), 0.0), back[1:]])
+    away, poses, _ = drive_along(plant, path)
+    assert away < 0.1
+    corner = np.argmax(poses[:, 0])
+    assert poses[corner, 0] == pytest.approx(1.0, abs=0.08)
+    assert (np.diff(poses[:corner, 0]) >= 0.0).all() and (np.diff(poses[corner:, 0]) <= 0.0).all()
+    assert np.hypot(*(poses[-1, :2] - path[-1, :2])) < 0.1
 
 
 def test_a_rover_that_stands_while_it_steers_is_given_its_time():
