@@ -18,6 +18,7 @@ from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
+from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
 from support.grounds import make_terrain, rock_left
 from support.rough_grounds import enlarged
@@ -95,6 +96,18 @@ def test_a_little_less_of_a_remedy_is_refused(advised):
             continue
         less = set_less(remedy, 1.01 * TOLERANCE)
         assert not less.judge().passes, remedy.describe()
+
+
+def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):
+    """The path was told to be traversable as it is."""
+    place = MarkedPlace(0.3, 0.0, 0.2, "stuck", "today")
+    monkeypatch.setattr(seek, "LEVERS", [one for one in LEVERS if one.name in ("policy", "shift")])
+    level = make_terrain(lambda x, y: 0.0 * x, half=2.6)
+    *_, advice = grow_advice(Case(LSR1, level, STRAIGHT, marked=MarkedPlaces((place,))))
+    assert advice.judged.verdict.code == MARKED_CODE
+    (shift,) = advice.remedies
+    x, y, _ = shift.judged.case.poses.T
+    assert np.hypot(x - place.x, y - place.y).min() >= place.radius
 
 
 def test_words_say_what_to_do_and_what_it_does_to_the_rover():

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps are heard whenever and however they are published, or who cannot be heard is named."""
 
+import time
 from functools import partial
 
 import pytest
@@ -56,6 +57,18 @@ def test_volatile_maps_and_where_the_parameter_says_so_best_effort_ones_are_hear
 ):
     heard, publisher = hear(**values), advertise(qos)
     repeat_until(lambda: publisher.publish(PointCloud2()), lambda: heard, "the map")
+
+
+def test_a_map_is_not_heard_again_when_a_silent_publisher_comes(advertise, hear):
+    publisher, heard = advertise(map_qos()), hear()
+    wait_until(lambda: publisher.get_subscription_count() == 2, "both subscriptions")
+    publisher.publish(PointCloud2(width=1))
+    wait_until(lambda: heard, "the map")
+    silent = advertise(map_qos(DurabilityPolicy.VOLATILE))
+    wait_until(lambda: silent.get_subscription_count() == 1, "the volatile subscription")
+    time.sleep(0.5)
+    assert len(heard) == 1
+    repeat_until(lambda: silent.publish(PointCloud2()), lambda: len(heard) > 1, "the other map")
 
 
 def test_a_best_effort_publisher_is_named_with_the_parameter_that_mends_it(advertise, hear, capfd):

@@ -176,66 +176,16 @@ def test_ros2_control_has_what_the_urdf_tells_and_the_controller_reads_and_comma
         assert ours in re.findall(r"[~/a-z_]+", said) and theirs.split("/")[0] in spawned
 
 
-COSTMAP = {
-    "plugins": list,
-    "filters": list,
-    "global_frame": str,
-    "robot_base_frame": str,
-    "rolling_window": bool,
-    "track_unknown_space": bool,
-    "trinary_costmap": bool,
-    "lethal_cost_threshold": int,
-    "unknown_cost_value": int,
-}
-"""Type of each parameter of a costmap that is used here, as the sources of Nav2 1.3.13 (Jazzy)
-have them: it is not on PyPI."""
-PLUGINS = {
-    "nav2_costmap_2d::StaticLayer": {
-        "enabled": bool,
-        "map_topic": str,
-        "map_subscribe_transient_local": bool,
-        "subscribe_to_updates": bool,
-        "transform_tolerance": float,
-        "footprint_clearing_enabled": bool,
-    },
-    "nav2_costmap_2d::KeepoutFilter": {
-        "enabled": bool,
-        "filter_info_topic": str,
-        "transform_tolerance": float,
-        "override_lethal_cost": bool,
-        "lethal_override_cost": float,
-    },
-}
-"""Type of each parameter of a layer or filter, by its class."""
-FILTER_INFO = {
-    "type": int,
-    "filter_info_topic": str,
-    "mask_topic": str,
-    "base": float,
-    "multiplier": float,
-}
-"""Type of each parameter of costmap_filter_info_server."""
-
-
 @pytest.mark.parametrize("file", ["hazard_layer.yaml", "hazard_filter.yaml"])
-def test_the_files_for_nav2_have_its_parameters_and_read_the_topic_of_the_server(file):
+def test_the_files_for_nav2_read_the_topic_of_the_server(file):
     content = yaml.safe_load((CONFIG / "nav2" / file).read_text(encoding="utf-8"))
     costmap = content.pop("global_costmap")["global_costmap"]["ros__parameters"]
     names = [name for kind in ("plugins", "filters") for name in costmap.get(kind, ())]
     plugins = [costmap.pop(name) for name in names]
-    check_types(costmap, COSTMAP)
-    for plugin in plugins:
-        check_types(plugin, PLUGINS[plugin.pop("plugin")])
     servers = [server["ros__parameters"] for server in content.values()]
     assert content.keys() <= {"costmap_filter_info_server"}
     for server in servers:
-        check_types(server, FILTER_INFO)
         assert server["filter_info_topic"] == plugins[0]["filter_info_topic"]
     read = [one[key] for one in (*plugins, *servers) for key in one if key in MAPS]
     said = PROGRAMS["traverse_server"].topics.replace("~", "/traverse_server")
     assert len(read) == 1 and read[0] in said.split("publishes")[1]
-
-
-def check_types(given, types):
-    """Fail where a parameter is not one of those of Nav2, or of another type."""
-    assert {name: type(value) for name, value in given.items()}.items() <= types.items()

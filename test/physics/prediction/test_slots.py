@@ -3,7 +3,7 @@
 
 import pytest
 
-from rover_physics import SweepOptions, judge_paths, judge_pieces
+from rover_physics import SweepOptions, judge_paths
 from rover_physics.names import OPTIMAL, SERVO
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rovers import LSR1
@@ -20,13 +20,6 @@ def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged(policy):
     )
     assert wide[0][1].code == "friction" and "wedged" in wide[0][1].reason
     assert narrow[0][1].traversable
-
-
-@pytest.mark.parametrize("policy", [OPTIMAL, SERVO])
-def test_pieces_of_a_path_into_a_slot_are_refused_as_the_path(policy):
-    options = SweepOptions(policy, friction=0.86, max_torque=2.44)
-    into, before = judge_pieces(ROVER, drive_ground("ditch", 0.194), [PATH, PATH[:60]], options)
-    assert (into.code, before.code) == ("friction", "")
 
 
 def test_a_wedged_rover_is_refused_with_any_friction_in_all_samples():

@@ -2,7 +2,6 @@
 """The terrain: what is refused, the bilinear look-up, filled gaps, files, and how it is packed."""
 
 import gc
-import pickle
 import weakref
 from dataclasses import fields
 from pathlib import Path
@@ -13,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
-from rover_physics import Terrain, load_rover, load_terrain, save_terrain
+from rover_physics import Terrain, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
-from rover_physics.prediction.packed_model import pack_model
 from rover_physics.terrain.ground import BLOCK, friction_at, height_inside, pack_ground
 from rover_physics.terrain.terrain_file import terrain_presets
 
@@ -251,13 +249,3 @@ def test_a_ground_outlives_its_terrain():
     _ = [np.full((40, 40), -1.0) for _ in range(50)]  # would take the place of what is freed
     assert height_inside(ground.records[0], 10.3, 20.7) == 0.25
     assert friction_at(ground.records[0], 1.0, 2.0, 0.9) == 0.6
-
-
-def test_addresses_do_not_leave_the_process():
-    terrain = Terrain(np.zeros((4, 4)), 0.1)
-    with pytest.raises(TypeError, match="pickle its Terrain"):
-        pickle.dumps(pack_ground(terrain))
-    with pytest.raises(TypeError, match="rover, terrain and options"):
-        pickle.dumps(pack_model(load_rover("lsr1"), terrain))
-    again = pickle.loads(pickle.dumps(terrain))
-    assert again.elevation.tobytes() == terrain.elevation.tobytes()

@@ -6,6 +6,7 @@ import pytest
 
 from rover_physics import SweepOptions, Terrain, judge_paths
 from rover_physics.rover.model import Rover
+from support.paths import arc_of, poses_at
 from support.rough_grounds import bouldered, enlarged, rocky, smooth, with_std
 from support.rovers import LSR1, SIMILAR, similar
 
@@ -16,14 +17,11 @@ RATIOS = (
 LENGTHS = ("belly_clearance", "wheel_drop", "lift_height", "wheel_centres", "distance")
 
 
-def curve(x: float, y: float, yaw: float, bend: float) -> np.ndarray:
-    """Return a path (50, 3) in steps of 2 cm with a curvature of `bend` [1/m]."""
-    yaws = yaw + 0.02 * bend * np.arange(50)
-    steps = 0.02 * np.column_stack([np.cos(yaws), np.sin(yaws)])
-    return np.column_stack([np.add((x, y), np.cumsum(steps, axis=0)), yaws])
-
-
-PATHS = [curve(-0.9, y, yaw, bend) for y in (-0.8, 0.2) for yaw, bend in ((0.0, 0.0), (0.4, 0.7))]
+PATHS = [
+    arc_of(bend, 0.02 * np.arange(50), yaw) + poses_at(-0.9, y)
+    for y in (-0.8, 0.2)
+    for yaw, bend in ((0.0, 0.0), (0.4, 0.7))
+]
 
 
 def judge(rover: Rover, ground: Terrain, policy: str):

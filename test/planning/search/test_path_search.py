@@ -143,6 +143,16 @@ def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
     assert answer.outcome == NO_WAY and answer.closed.around_goal
 
 
+def test_what_only_whole_paths_are_refused_for_closes_an_area_too():
+    """Edges that were closed for it were open again, and all of the map was reachable."""
+    ledge = make_terrain(lambda x, y: np.where(x > 0.2, -0.3, 0.0), half=1.5)
+    rover = replace(LSR1, limits=replace(LSR1.limits, wheel_drop=1.0))
+    question = ask(ledge, (-0.9, 0.0, 0.0), (0.8, 0.0, 0.0), rover)
+    answer = find_path(question, replace(LONG, cell=0.5))
+    assert answer.outcome == NO_WAY and "trapped" in answer.closed.causes
+    assert answer.closed.around_goal and answer.closed.area < 4.5
+
+
 def test_out_of_time_is_not_no_way():
     question = ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
     answer = find_path(question, LatticeSettings(budget=1e-3))
