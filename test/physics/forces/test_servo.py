@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policy "servo" on firm ground and on soil: the nine equations hold, and rovers do as they must.
-
-That mirrored grounds have mirrored answers is in test_symmetries.py.
-"""
+"""Policy "servo" on firm ground and on soil: nine equations hold, and rovers do as they must."""
 
 from dataclasses import replace
 

@@ -222,12 +222,8 @@ def test_a_turn_fails_where_only_its_middle_does(policy):
     assert prediction.settled.all()
     assert verdict.first_failure == 1
     assert not judge_path(LSR1, POST, DENSE, options)[1].traversable
-
-
-def test_a_path_that_stops_at_its_failure_and_a_long_one_judge_turns_too():
-    verdict = judge_path(LSR1, POST, HALF_TURN)[1]
-    stopped = judge_path(LSR1, POST, HALF_TURN, stop_at_failure=True)[1]
-    in_parts = PartwiseJudge(LSR1, POST, HALF_TURN)
+    stopped = judge_path(LSR1, POST, HALF_TURN, options, stop_at_failure=True)[1]
+    in_parts = PartwiseJudge(LSR1, POST, HALF_TURN, options)
     assert len(list(in_parts.parts())) == 1
     assert stopped.reasons == in_parts.verdict().reasons == verdict.reasons
 
