@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.limits.table import CHANCE
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.path_search import FOUND, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.rough_grounds import plane
@@ -31,15 +30,6 @@ def slippery():
 def options(accepted: float) -> PathQueryOptions:
     """Return the options of a server with these parameters."""
     return load_settings(candidate_count=1, waypoint_spacing=0.05, accepted_chance=accepted).query
-
-
-def test_a_path_is_refused_by_its_chance_alone(slippery):
-    plain = answer_path_query(LSR1, slippery, START, GOAL, options(1.0))
-    assert plain.traversable and np.isnan(plain.chosen.verdict.failure_chance)
-    refused = answer_path_query(LSR1, slippery, START, GOAL, options(0.05)).chosen.verdict
-    assert refused.code == CHANCE and refused.failure_chance > 0.05
-    assert refused.reason.startswith("the path passes as told, but fails with a chance of ")
-    assert abs(plain.chosen.poses[refused.first_failure, 0]) < 1.0
 
 
 @pytest.mark.long
