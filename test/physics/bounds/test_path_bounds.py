@@ -70,13 +70,10 @@ def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterato
     """
     rng = np.random.default_rng(seed)
     shape, width = terrain.elevation.shape, length / terrain.resolution / 2.0
-    smooth = partial(gaussian_filter, sigma=width, mode="wrap")
-    impulse = np.zeros(shape)
-    impulse[shape[0] // 2, shape[1] // 2] = 1.0
-    scale = 1.0 / np.sqrt((smooth(impulse) ** 2).sum())
     for _ in range(count):
-        error = scale * smooth(rng.standard_normal(shape))
-        yield replace(terrain, elevation=terrain.elevation + terrain.elevation_std * error)
+        error = gaussian_filter(rng.standard_normal(shape), width, mode="wrap")
+        error *= terrain.elevation_std / error.std()
+        yield replace(terrain, elevation=terrain.elevation + error)
 
 
 SLOPE = plane(0.2, 0.1, half=3.0)
