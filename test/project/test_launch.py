@@ -99,12 +99,12 @@ def test_a_parameter_file_has_parameters_that_exist_for_any_namespace(path):
     check_parameters(node, content["ros__parameters"])
 
 
-def test_a_parameter_file_has_the_defaults_where_it_is_not_for_a_simulation():
-    for name in ("traverse_server", "traction_controller"):
-        path = TOP / "config" / "parameters" / f"{name}.yaml"
-        defaults = {spec.name: spec.ros_default for spec in PROGRAMS[name].parameters}
-        for key, value in yaml.safe_load(path.read_text())["/**"]["ros__parameters"].items():
-            assert defaults[key] == value, key
+@pytest.mark.parametrize("name", ["traverse_server", "traction_controller"])
+def test_a_parameter_file_has_the_defaults_where_it_is_not_for_a_simulation(name):
+    text = (CONFIG / "parameters" / f"{name}.yaml").read_text()
+    defaults = {spec.name: spec.ros_default for spec in PROGRAMS[name].parameters}
+    for key, value in yaml.safe_load(text)["/**"]["ros__parameters"].items():
+        assert defaults[key] == value, key
 
 
 def topics_of(path: Path) -> set[str]:
