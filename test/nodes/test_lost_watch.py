@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover whose watch is lost stops: the processes of the launch file, killed while it drives."""
 
-import signal
 import subprocess
 import time
 
@@ -46,10 +45,7 @@ def start_drive(planner) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
-def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(
-    ros, processes, planner, how
-):
+def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(ros, processes, planner):
     ear = ros.spin(Node("ear", context=ros.context))
     states = hear(ear, String, "traction_controller/state", latched_qos())
     odometry = hear(ear, Odometry, "odometry", sensor_qos())
@@ -64,16 +60,12 @@ def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(
     assert is_in("fault")  # nothing was accepted yet
     start_drive(planner)
     wait_until(lambda: is_in("driving") and speed() > 0.02, "the drive", 60.0)
-    processes["traverse_server"].send_signal(how)
+    processes["traverse_server"].kill()
     lost = time.monotonic()
     wait_until(lambda: is_in("fault"), "the stop")
     assert time.monotonic() - lost < LONGEST
     time.sleep(0.5)
     assert abs(speed()) < 1e-3  # held
-    if how == signal.SIGSTOP:
-        processes["traverse_server"].send_signal(signal.SIGCONT)
-        wait_until(lambda: is_in("driving"), "the watch to go on")
-        return
     processes["traverse_server"] = subprocess.Popen(processes["traverse_server"].args)
     pose = planner.wait_for_pose(lambda pose: True, 1.0)
     time.sleep(2.0)

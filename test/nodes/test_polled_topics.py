@@ -13,7 +13,7 @@ from std_msgs.msg import String
 from msg_adapters.errors import MessageError
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import joints_qos, topic_qos
+from rover_planner.ros.qos import topic_qos
 from support.waiting import wait_until
 
 NAMES, WORDS = ("questions", "answers"), ["bad", "good", "better", "best"]
@@ -93,24 +93,3 @@ def test_what_cannot_be_used_is_logged_once_or_refused_by_who_asks(ros, advertis
     wait_until(poll, "both refusals")
     assert refused == ["others"] and lines == ["joints not used: no positions"]
     assert guard.total == 0
-
-
-def test_a_fast_publisher_of_joint_states_does_not_push_out_a_slow_one(ros, advertise):
-    """A rover's suspension at 50 Hz beside its wheels at 500 Hz."""
-    heard: list[str] = []
-    node = ros.spin(Node("hearer", context=ros.context))
-    topics = PolledTopics(node, Guard(node.get_logger()))
-    topics.subscribe(
-        JointState, "joints", lambda joints, _: heard.extend(joints.name), joints_qos(0.1)
-    )
-    slow, fast = advertise(JointState, "joints", "joints")
-    slow.publish(JointState(name=["rocker"]))
-    for _ in range(round(0.1 * 500.0)):
-        fast.publish(JointState(name=["wheel"]))
-    time.sleep(0.3)  # all have come
-
-    def poll():
-        topics.poll()
-        return {"rocker", "wheel"} <= set(heard)
-
-    wait_until(poll, "both")

@@ -238,7 +238,14 @@ class _PathFinder:
             self._memory.keep_path(self._query, progress.pieces)
             return self._make_result(FOUND, "", path=(progress.best, progress.cost))
         search = self._prepare()
-        search.run(self._allowed)
+        try:
+            return self._run(search)
+        finally:
+            search.reopen()
+
+    def _run(self, search: LatticeSearch) -> SearchResult:
+        """Search the lattice."""
+        progress = search.run(self._allowed)
         if progress.best is not None:
             path = self._smooth(progress)
             return self._make_result(FOUND, self._describe_rest(path[0]), search, path=path)

@@ -5,19 +5,14 @@ import copy
 import math
 
 import pytest
-from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from rclpy.parameter import Parameter
-from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros import subscriptions
-from rover_planner.ros.qos import map_qos, sensor_qos
+from rover_planner.ros.qos import sensor_qos
 from support.messages import odometry_at
-from support.ros_fixtures import RosRun, run_in_executor
-from support.rough_grounds import plane
+from support.ros_fixtures import RosRun
 from support.waiting import repeat_until, wait_until
 
 CYCLES_IN_A_TENTH = 5
@@ -87,17 +82,6 @@ def test_an_unforeseen_error_in_a_callback_is_a_fault_and_not_the_end(
         assert int(rover.values["internal_errors"]) > 0
     wait_until(lambda: rover.state == "driving", "driving")
     assert rover.count_lines("Traceback") == 1 and ros.is_alive(controller)
-
-
-def test_a_change_of_the_cell_height_acts_on_the_map_that_is_there(rover, controller):
-    sender = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-    sender.publish(terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time()))
-    first = wait_until(lambda: controller.service.terrain, "the map")
-    changes = [Parameter("map_resolution", value=0.2), Parameter("cell_height", value="mean")]
-    changed = run_in_executor(controller, lambda: controller.set_parameters_atomically(changes))
-    assert changed.successful
-    wait_until(lambda: controller.service.terrain is not first, "the map in other cells")
-    assert controller.service.terrain.resolution == 0.2
 
 
 def test_a_mounted_imu_is_turned_into_the_body_frame_and_steering_has_the_sign_of_the_rover(

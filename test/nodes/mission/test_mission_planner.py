@@ -19,7 +19,6 @@ from rover_planner.nodes import mission_planner
 from rover_planner.nodes.mission.drive import DriveFailedError
 from rover_planner.nodes.mission_planner import NoAnswerError, main
 from rover_planner.nodes.programs import MissionOptions, read_arguments
-from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, rock_left, wall_at, waves
@@ -153,17 +152,6 @@ def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for(run_pl
     code, _, err = run_planner(NEAR, "--timeout=1")
     assert code == 4 and err.count("\n") == 1
     assert "in vain for the service /traverse_server/can_traverse and the topic /tra" in err
-
-
-def test_a_server_with_another_name_is_found_by_remapping(ros, run_planner):
-    judge = ["--ros-args", "-r", "__node:=judge"]
-    server = ros.start(TraverseServer, judge, time_budget=60.0)
-    server.service.take_terrain(make_terrain(waves))
-    names = ("can_traverse", "verdict", "wheel_loads", "slip_ratios")
-    words = [f"traverse_server/{name}:=judge/{name}" for name in names]
-    remapped = [word for name in words for word in ("-r", name)]
-    code, out, _ = run_planner(NEAR, "--timeout=20", "--ros-args", *remapped)
-    assert (code, "goal 1: yes" in out) == (0, True)
 
 
 def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again(

@@ -30,16 +30,11 @@ def nodes():
         yield opened
 
 
-@pytest.mark.parametrize(
-    ("budget", "half_length", "spacing", "busy"), [(5.0, 1.5, 0.05, 0), (1.0, 45.0, 0.001, 40)]
-)
-def test_fifty_questions_at_once_are_answered_or_refused_within_the_budget(
-    nodes, budget, half_length, spacing, busy
-):
-    ground = make_terrain(waves, half=half_length + 2.0)
-    nodes.start(SERVER, terrain_file=ground, time_budget=budget, waypoint_spacing=spacing)
+def test_fifty_questions_at_once_are_answered_or_refused_within_the_budget(nodes):
+    budget, ground = 1.0, make_terrain(waves, half=47.0)
+    nodes.start(SERVER, terrain_file=ground, time_budget=budget, waypoint_spacing=0.001)
     clients = [nodes.client(f"asker{k}").connect() for k in range(5)]
-    path = poses_path([(-half_length, 0.0, 0.0), (half_length, 0.0, 0.0)], "map")
+    path = poses_path([(-45.0, 0.0, 0.0), (45.0, 0.0, 0.0)], "map")
     clients[0].publish(path)
     wait_until(lambda: clients[0].check()["path_hash"] == path_hash(path), "the path", START_TIME)
     began = time.monotonic()
@@ -47,16 +42,7 @@ def test_fifty_questions_at_once_are_answered_or_refused_within_the_budget(
     messages = [finish(future, budget + 30.0).message for future in futures]
     assert time.monotonic() - began < budget + LATE
     codes = Counter(json.loads(message)["code"] or "traversable" for message in messages)
-    assert codes.keys() <= {"traversable", "busy", "too_long"} and codes["busy"] >= busy
-
-
-def test_no_answer_is_lost_under_questions_without_a_pause(nodes):
-    nodes.start(SERVER, terrain_file=make_terrain(waves), candidate_count=1, time_budget=30.0)
-    asker, answers, end = nodes.client("asker").connect(), 0, time.monotonic() + 4.0
-    while time.monotonic() < end:
-        assert asker.plan((-2.0, 0.0, 0.0), (2.0, 0.3, 0.0), 40.0).poses
-        answers += 1
-    assert answers > 20
+    assert codes.keys() <= {"traversable", "busy", "too_long"} and codes["busy"] >= 40
 
 
 def test_a_signal_during_a_question_ends_the_server_soon(nodes):
