@@ -10,7 +10,6 @@ import pytest
 
 from rover_physics import SweepOptions, judge_path
 from rover_physics.rover.steering_joints import tightest_radius
-from rover_planner.advice import case as case_module
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case
@@ -99,14 +98,6 @@ def test_a_little_less_of_a_remedy_is_refused(advised):
         assert not less.judge().passes, remedy.describe()
 
 
-def test_a_path_around_is_searched(monkeypatch):
-    monkeypatch.setattr(case_module, "SEARCH", replace(case_module.SEARCH, budget=60.0))
-    case = refused_by(rock_left)
-    around = case.judge().path_around
-    assert around is not None and replace(case, poses=around).judge().passes
-    np.testing.assert_allclose(around[[0, -1]], STRAIGHT[[0, -1]], atol=1e-9)
-
-
 def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):
     """The path was told to be traversable as it is."""
     place = MarkedPlace(0.3, 0.0, 0.2, "stuck", "today")
@@ -160,22 +151,15 @@ def test_what_was_not_tried_in_time_is_told():
         list(grow_within(refused_by(wall), check))
 
 
-def test_two_poses_far_apart_are_start_and_goal():
-    ends = STRAIGHT[[0, -1]]
-    path = path_of(LSR1, ends, 0.02)
-    assert len(path) > 100 and np.allclose(path[[0, -1]], ends)
-    assert path_of(LSR1, ends[:1], 0.02) is not None
-    near = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
-    assert path_of(LSR1, near, 0.02).shape == (2, 3)
-
-
 @pytest.mark.parametrize("rover", [LSR1, M2020, FIXED], ids=["lsr1", "m2020", "fixed"])
-def test_the_path_between_start_and_goal_has_the_tightest_curve_of_the_rover(rover):
+def test_two_poses_far_apart_are_ends_of_a_path_with_the_tightest_curve_of_the_rover(rover):
     ends = np.array([[0.0, 0.0, 0.0], [-rover.wheelbase, 0.0, 0.0]])
     path = path_of(rover, ends, 0.01)
+    np.testing.assert_allclose(path[[0, -1]], ends)
     turned = np.abs(np.diff(np.unwrap(path[:, 2])))
     radius = np.diff(distance_along(path)).max() / turned.max()
     assert radius == pytest.approx(tightest_radius(rover), rel=0.02)
+    assert len(path_of(rover, 0.4 * ends, 0.01)) == 2 and len(path_of(rover, ends[:1], 0.01)) == 1
 
 
 def test_energy_and_time_are_above_those_of_the_path_as_if_it_went_on():
@@ -232,12 +216,14 @@ def test_a_path_that_mostly_turns_on_the_spot_is_driven_backward():
 
 
 @pytest.mark.parametrize("size", [0.25, 2.0])
-def test_the_way_around_is_as_long_for_the_size_of_the_rover(size):
+def test_the_way_around_passes_and_is_as_long_for_the_size_of_the_rover(size):
     def way_around(size: float) -> float:
-        rover = similar(LSR1, size)
         ground = enlarged(make_terrain(rock_left, half=3.0), size)
         poses = STRAIGHT * [size, size, 1.0]
-        path = Case(rover, ground, poses).judge().path_around
+        case = Case(similar(LSR1, size), ground, poses)
+        path = case.judge().path_around
+        np.testing.assert_allclose(path[[0, -1]], poses[[0, -1]], atol=1e-9)
+        assert replace(case, poses=path).judge().passes
         return distance_along(path)[-1]
 
     assert way_around(size) == pytest.approx(size * way_around(1.0), rel=1e-3)

@@ -12,6 +12,7 @@ from rover_planner.planning.search.path_search import FOUND, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.rough_grounds import plane
 from support.rovers import LSR1
+from support.services import load_settings
 
 START, GOAL = (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0)
 LONG = LatticeSettings(budget=60.0, cell=0.3)
@@ -27,8 +28,9 @@ def slippery():
     return replace(ground, friction=np.where(patch, 0.32, 0.8))
 
 
-def options(accepted: float, count: int = 1) -> PathQueryOptions:
-    return PathQueryOptions(count=count, waypoint_spacing=0.05, accepted_chance=accepted)
+def options(accepted: float) -> PathQueryOptions:
+    """Return the options of a server with these parameters."""
+    return load_settings(candidate_count=1, waypoint_spacing=0.05, accepted_chance=accepted).query
 
 
 def test_a_path_is_refused_by_its_chance_alone(slippery):

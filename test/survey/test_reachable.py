@@ -55,25 +55,6 @@ def graph_of(passable, turnable, headings):
     return csr_array((np.array(list(edges.values())), (at[0], at[1])), shape=(size, size))
 
 
-def make_flags(shape, headings, seed, share):
-    """Return flags (rows, columns, headings): where a rover passes, and where it turns."""
-    rng = np.random.default_rng(seed)
-    open_at = rng.random((*shape, headings)) < share
-    open_at[shape[0] // 2, shape[1] // 2] = True
-    return open_at, open_at & (rng.random(open_at.shape) < 0.7)
-
-
-def search(open_at, turns_at, chunk):
-    """Return the numbers of the area around the middle, and its distances."""
-    shape, headings = open_at.shape[:2], open_at.shape[2]
-    grid = HeadingGrid(pack_bits(open_at), pack_bits(turns_at), find_moves(headings, CELL), chunk)
-    distance = np.full(shape, np.inf, np.float32)
-    with tempfile.TemporaryDirectory() as folder:
-        start = shape[0] // 2, shape[1] // 2
-        numbers = search_area(grid, start, distance, Path(folder))
-    return numbers, distance
-
-
 def compare_with_scipy(open_at, turns_at, numbers, distance):
     """Assert that an area is that of Dijkstra's algorithm and strong components on all nodes."""
     rows, columns, headings = open_at.shape
@@ -104,8 +85,14 @@ def compare_with_scipy(open_at, turns_at, numbers, distance):
     chunk=st.integers(1, 10),
 )
 def test_areas_of_any_map_are_those_of_scipy(shape, headings, seed, share, chunk):
-    open_at, turns_at = make_flags(shape, headings, seed, share)
-    numbers, distance = search(open_at, turns_at, chunk)
+    rng, middle = np.random.default_rng(seed), (shape[0] // 2, shape[1] // 2)
+    open_at = rng.random((*shape, headings)) < share
+    open_at[middle] = True
+    turns_at = open_at & (rng.random(open_at.shape) < 0.7)
+    grid = HeadingGrid(pack_bits(open_at), pack_bits(turns_at), find_moves(headings, CELL), chunk)
+    distance = np.full(shape, np.inf, np.float32)
+    with tempfile.TemporaryDirectory() as folder:
+        numbers = search_area(grid, middle, distance, Path(folder))
     compare_with_scipy(open_at, turns_at, numbers, distance)
 
 
