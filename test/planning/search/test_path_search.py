@@ -161,6 +161,16 @@ def test_out_of_time_is_not_no_way():
     assert "0.001 s" in answer.reason
 
 
+def test_a_rover_that_slips_up_a_slope_of_sand_may_back_out():
+    """It was told that it cannot stand at the start."""
+    slope = make_terrain(lambda x, y: 0.2 * np.maximum(x, 0.0), half=2.2)
+    question = ask(slope, (1.0, 0.0, 0.0), (-0.8, 0.0, 0.0), soil="dry_sand", accepted_chance=1.0)
+    ahead = judge_path(LSR1, slope, [question.start], question.options.model)[1]
+    assert ahead.code == "friction"
+    answer = find_path(question, replace(LONG, cell=0.4, ends_at_first=True))
+    assert answer.outcome == FOUND and answer.path.verdict.traversable
+
+
 @pytest.mark.parametrize(
     ("start", "goal", "said"),
     [
