@@ -12,18 +12,11 @@ from rover_planner.nodes.nav2_services import Nav2Services
 from support.grounds import make_terrain, wall_at, waves
 from support.waiting import wait_until
 
-COMPUTE_PATH_TO_POSE = {
-    "NONE": 0,
-    "UNKNOWN": 200,
-    "INVALID_PLANNER": 201,
-    "TF_ERROR": 202,
-    "START_OUTSIDE_MAP": 203,
-    "GOAL_OUTSIDE_MAP": 204,
-    "START_OCCUPIED": 205,
-    "GOAL_OCCUPIED": 206,
-    "TIMEOUT": 207,
-    "NO_VALID_PATH": 208,
-}
+ERRORS = (
+    "UNKNOWN", "INVALID_PLANNER", "TF_ERROR", "START_OUTSIDE_MAP", "GOAL_OUTSIDE_MAP",
+    "START_OCCUPIED", "GOAL_OCCUPIED", "TIMEOUT", "NO_VALID_PATH",
+)  # fmt: skip
+COMPUTE_PATH_TO_POSE = {"NONE": 0} | {name: 200 + k for k, name in enumerate(ERRORS)}
 """Constants of the result of the action in Nav2 1.3.13, as its sources have them; 1.3.0 has the
 same. Nav2 is not on PyPI."""
 
