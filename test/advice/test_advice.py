@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice: each remedy passes as told, less of it does not, and few levers come before more."""
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import permutations, takewhile
@@ -113,10 +114,11 @@ def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):
 def test_words_say_what_to_do_and_what_it_does_to_the_rover():
     advice, _ = advise_on("heavy load")
     words = {one.levers[0].lever.name: one.describe() for one in advice.found}
-    assert words["payload"].startswith("Carry ")
-    assert "kg less at the arm's tip: the rear wheels then carry " in words["payload"]
-    assert " N less; largest use 0." in words["payload"]
-    assert words["payload"].endswith(" m (friction)")
+    expected = (
+        r"Carry .* kg less at the arm's tip: the rear wheels then carry .* N less; "
+        r"largest use 0\..* m \(friction\)"
+    )
+    assert re.fullmatch(expected, words["payload"])
 
 
 def test_several_levers_are_set_where_none_helps_alone(monkeypatch):
@@ -164,13 +166,12 @@ def test_two_poses_far_apart_are_ends_of_a_path_with_the_tightest_curve_of_the_r
 
 def test_energy_and_time_are_above_those_of_the_path_as_if_it_went_on():
     """The path fails at its first waypoint, so that nothing lies before it."""
-    case = refused_by(slope, friction=0.45)
-    refusal_ = case.judge()
-    assert refusal_.place == 0
-    found = next(one for one in grow_advice(case) if one.found).found[0]
+    advice, _ = advise_on("slippery slope")
+    refused, found = advice.judged, advice.found[0]
+    assert refused.place == 0
     # The climb is the same; what servos slip costs more.
-    assert 0.0 < found.extra_energy < 0.3 * refusal_.energy
-    assert 0.0 < found.extra_time < 0.3 * refusal_.time
+    assert 0.0 < found.extra_energy < 0.3 * refused.energy
+    assert 0.0 < found.extra_time < 0.3 * refused.time
 
 
 def test_a_use_of_servos_tells_how_far_away_a_failure_is():

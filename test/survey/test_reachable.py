@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from rover_physics import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import pack_bits, unpack_bits
+from rover_planner.survey.layers import pack_bits
 from rover_planner.survey.reachable import (
     DISTANCE,
     GROUP,
@@ -34,11 +34,10 @@ from support.survey_maps import make_request, survey_here
 CELL = 0.25
 
 
-def graph_of(passable, turnable, headings):
+def graph_of(may, turns):
     """Return the graph of nodes (row, column, heading) with all moves and turns, for scipy."""
+    rows, columns, headings = may.shape
     moves = find_moves(headings, CELL)
-    may, turns = unpack_bits(passable, headings), unpack_bits(turnable, headings)
-    rows, columns = passable.shape
     edges = {}
     for i, j, k in np.argwhere(may):
         ways = [(i + di, j + dj) for di, dj in moves.steps[k, : moves.counts[k]]]
@@ -53,28 +52,6 @@ def graph_of(passable, turnable, headings):
                                (rows, columns, headings)) for e in (0, 1)]  # fmt: skip
     # Explicit zeros are edges for scipy's sparse graphs.
     return csr_array((np.array(list(edges.values())), (at[0], at[1])), shape=(size, size))
-
-
-def compare_with_scipy(open_at, turns_at, numbers, distance):
-    """Assert that an area is that of Dijkstra's algorithm and strong components on all nodes."""
-    rows, columns, headings = open_at.shape
-    size, first = open_at.size, (rows // 2 * columns + columns // 2) * headings
-    graph = graph_of(pack_bits(open_at), pack_bits(turns_at), headings)
-    starts = [first + k for k in range(headings) if open_at.reshape(-1)[first + k]]
-    out = dijkstra(graph, indices=starts, min_only=True).reshape(open_at.shape)
-    at = graph.tocoo()
-    tails, heads = (
-        np.concatenate([ends, more])
-        for ends, more in zip(at.coords, (starts, np.roll(starts, 1)), strict=True)
-    )
-    joined = csr_array((np.ones(len(tails)), (tails, heads)), shape=(size, size))
-    _, labels = connected_components(joined, connection="strong")
-    inside = (labels == labels[starts[0]]).reshape(open_at.shape)
-    wanted = np.where(inside, out, np.inf).min(axis=2)
-    np.testing.assert_allclose(distance, wanted, rtol=1e-5)
-    assert numbers.cells == np.isfinite(wanted).sum()
-    assert numbers.reached == np.isfinite(out).any(axis=2).sum()
-    assert numbers.longest == distance[np.isfinite(distance)].max() == distance[numbers.farthest]
 
 
 @given(
@@ -93,7 +70,24 @@ def test_areas_of_any_map_are_those_of_scipy(shape, headings, seed, share, chunk
     distance = np.full(shape, np.inf, np.float32)
     with tempfile.TemporaryDirectory() as folder:
         numbers = search_area(grid, middle, distance, Path(folder))
-    compare_with_scipy(open_at, turns_at, numbers, distance)
+    # Dijkstra's algorithm and strong components on all nodes.
+    size, first = open_at.size, np.ravel_multi_index(middle, shape) * headings
+    graph = graph_of(open_at, turns_at)
+    starts = [first + k for k in range(headings) if open_at.reshape(-1)[first + k]]
+    out = dijkstra(graph, indices=starts, min_only=True).reshape(open_at.shape)
+    at = graph.tocoo()
+    tails, heads = (
+        np.concatenate([ends, more])
+        for ends, more in zip(at.coords, (starts, np.roll(starts, 1)), strict=True)
+    )
+    joined = csr_array((np.ones(len(tails)), (tails, heads)), shape=(size, size))
+    _, labels = connected_components(joined, connection="strong")
+    inside = (labels == labels[starts[0]]).reshape(open_at.shape)
+    wanted = np.where(inside, out, np.inf).min(axis=2)
+    np.testing.assert_allclose(distance, wanted, rtol=1e-5)
+    assert numbers.cells == np.isfinite(wanted).sum()
+    assert numbers.reached == np.isfinite(out).any(axis=2).sum()
+    assert numbers.longest == distance[np.isfinite(distance)].max() == distance[numbers.farthest]
 
 
 def test_the_area_is_kept_in_the_store_with_what_was_surveyed_then(tmp_path):

@@ -32,19 +32,12 @@ from support.survey_maps import (
 HEAVIER = replace(LSR1, wheel=replace(LSR1.wheel, mass=0.36))
 
 
-@pytest.fixture(scope="module")
-def surveyed(tmp_path_factory):
+@pytest.fixture
+def finished(tmp_path):
     """Return a folder with a map, whose first chunk of 16 cells is unknown, and its survey."""
     ground = raised(make_rough_map(140, 140), np.s_[:100, :100], np.nan)
-    folder = tmp_path_factory.mktemp("surveyed")
-    survey_here(folder, ground, make_request(step=4, headings=2), chunk=16)
-    return folder
-
-
-@pytest.fixture
-def finished(surveyed, tmp_path):
-    """Return a copy of it that a test may damage."""
-    return shutil.copytree(surveyed, tmp_path / "copy")
+    survey_here(tmp_path, ground, make_request(step=4, headings=2), chunk=16)
+    return tmp_path
 
 
 @pytest.fixture

@@ -26,8 +26,9 @@ from rover_planner.planning.search.path_search import (
 )
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.grounds import make_terrain, pen, raised, waves
-from support.rough_grounds import fractal, rocky
+from support.rough_grounds import fractal, plane, rocky
 from support.rovers import LSR1
+from support.services import load_settings
 
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
 LONG = LatticeSettings(budget=60.0, cell=0.25)
@@ -297,3 +298,38 @@ def test_a_rover_that_turns_widely_reaches_a_goal_between_the_lines_of_the_latti
     answer = find_path(question, replace(LONG, cell=0.2))
     assert answer.outcome == FOUND
     np.testing.assert_allclose(answer.path.poses[-1], question.goal, atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def slippery():
+    """A slope with a patch in the middle on which friction is just enough."""
+    ground = plane(0.2, 0.0, half=3.0)
+    axis = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[0])
+    x, y = np.meshgrid(axis, axis)
+    patch = (abs(x) < 0.5) & (abs(y) < 0.5)
+    return replace(ground, friction=np.where(patch, 0.32, 0.8))
+
+
+def ask_across(ground, accepted_chance):
+    """Return the question of a server that leads across the middle."""
+    asked = load_settings(waypoint_spacing=0.05, accepted_chance=accepted_chance).query
+    return SearchQuery(LSR1, ground, (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0), asked)
+
+
+@pytest.mark.long
+def test_a_search_goes_around_what_its_chance_refuses(slippery):
+    settings = LatticeSettings(budget=60.0, ends_at_first=True)
+    answer = find_path(ask_across(slippery, 0.05), settings)
+    assert answer.outcome == FOUND
+    assert answer.path.verdict.failure_chance <= 0.05
+    assert np.abs(answer.path.poses[:, 1]).max() > 0.5
+
+
+def test_a_search_goes_around_what_may_fail_if_the_weight_of_chances_pays_for_it(slippery):
+    question, coarse = ask_across(slippery, 1.0), replace(LONG, cell=0.3)
+    straight = find_path(question, coarse).path
+    assert np.abs(straight.poses[:, 1]).max() < 0.5
+    answer = find_path(question, replace(coarse, chance_weight=50.0))
+    path, chance = answer.path, answer.report()["failure_chance"]
+    assert answer.outcome == FOUND and path.verdict.failure_chance == chance < 0.05
+    assert np.abs(path.poses[:, 1]).max() > 0.5 and path.length > straight.length + 0.1
