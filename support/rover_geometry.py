@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rover_physics import PathPrediction, Rover, Terrain
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 
 UP = np.array([0.0, 0.0, 1.0])
 GAP = 3e-5
@@ -193,14 +194,8 @@ STARTS, REFINEMENTS = 6, 7
 def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the smallest vertical gap (6,) [m] between each wheel's lower half and the ground.
 
-    The whole width of the wheels is looked at, densely and at all vertices of the ground, then
-    around the nearest points.
-
-    Args:
-        rover: The rover.
-        terrain: The ground.
-        prediction: The model's prediction.
-        i: Index of the waypoint.
+    The whole width of the wheels of waypoint i is looked at, densely and at all vertices of the
+    ground, then around the nearest points.
     """
     wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
     return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
@@ -258,29 +253,16 @@ def vertices_below(
 
 
 def turned_round(rover: Rover) -> Rover:
-    """Return the same rover with front and rear exchanged."""
-
-    def flip(point):
-        return (-point[0], point[1], point[2])
-
-    suspension, masses, belly = rover.suspension, rover.masses, rover.belly
-    parts = {name: getattr(masses, name) for name in ("body", "rocker", "bogie")}
-    flipped = {name: replace(part, com=flip(part.com)) for name, part in parts.items()}
-    other = {"rear": "front", "front": "rear", "middle": "middle"}
-    low, high = suspension.rocker_limits, suspension.bogie_limits
-    return replace(
-        rover,
-        name=f"{rover.name}_turned_round",
-        manipulator=None,
-        suspension=replace(
-            suspension,
-            rocker_pivot=flip(suspension.rocker_pivot),
-            bogie_pivot=flip(suspension.bogie_pivot),
-            rocker_wheel=other[suspension.rocker_wheel],
-            wheels={other[name]: flip(place) for name, place in suspension.wheels.items()},
-            rocker_limits=(-low[1], -low[0]),
-            bogie_limits=(-high[1], -high[0]),
-        ),
-        masses=replace(masses, **flipped),
-        belly=replace(belly, x=(-belly.x[1], -belly.x[0])),
-    )
+    """Return the same rover with front and rear exchanged, without an arm."""
+    name = f"{rover.name}_turned_round"
+    contents = rover_to_dict(replace(rover, name=name, manipulator=None))
+    suspension, belly = contents["suspension"], contents["belly"]
+    wheels = suspension["wheels"]
+    parts = [contents["masses"][name]["com"] for name in ("body", "rocker", "bogie")]
+    for place in (suspension["rocker_pivot"], suspension["bogie_pivot"], *wheels.values(), *parts):
+        place[0] = -place[0]
+    for ends in (suspension["rocker_limits"], suspension["bogie_limits"], belly["x"]):
+        ends[:] = -ends[1], -ends[0]
+    wheels["rear"], wheels["front"] = wheels["front"], wheels["rear"]
+    suspension["rocker_wheel"] = "front" if suspension["rocker_wheel"] == "rear" else "rear"
+    return rover_from_dict(contents, name)

@@ -17,7 +17,6 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.command_line import assert_refused
 from support.project.checkout import TOP
 from support.project.processes import ProcessToken
-from support.ros_fixtures import DOMAINS, domain_id
 from support.rovers import LSR1
 from support.waiting import wait_until
 
@@ -95,11 +94,6 @@ def test_goals_that_a_busy_server_has_no_time_for_are_refused_in_the_table(
     refused = [answer["code"] for answer in answers if not answer["traversable"]]
     assert "too_long" in refused
     assert capsys.readouterr().out.count("│ refused") == len(refused)
-
-
-def test_a_demo_takes_no_domain_of_a_test_though_it_looks_unused():
-    taken = {int(demo_module._environment()["ROS_DOMAIN_ID"]) for _ in range(20)}
-    assert domain_id() <= DOMAINS < min(taken)
 
 
 @pytest.mark.long

@@ -121,6 +121,7 @@ def test_what_a_plain_installation_brings_is_known_by_its_modules():
         ("rover_simulator", ["--engine", "horses"], "'horses'; it must be one of quasi_static"),
         ("traverse_server", ["--ros-args", "-p", "terrain_file:=/no/file.npz"], "/no/file.npz"),
         ("traction_controller", ["--ros-args", "-p", "friction"], "-p friction"),
+        ("traction_controller", ["--ros-args", "-p", "use_sim_time:=1"], "expecting type 'BOOL'"),
         ("mission_planner", ["--ros-args", "--colour"], "--colour"),
         ("mission_planner", ["--start=0,0,0"], "--goal"),
         ("mission_planner", [START[:-2], "--goal=1,0,0"], "'0,0' is no pose; it must be X,Y,YAW"),

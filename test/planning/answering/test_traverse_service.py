@@ -92,29 +92,27 @@ def test_a_learned_friction_changes_new_questions_only_if_it_is_to_be_used(
 
 def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     flat = make_terrain(waves)
-    numbers = np.full(flat.elevation.shape, 2.0)
+    shape = flat.elevation.shape
     grip = LearnedGround(0.9, 0.2, 0.1, is_bounded=False)
     classes = {1: LearnedGround(0.4, 0.02, 0.36, is_bounded=True), 2: grip}
     ground = LearnedGround(0.5, 0.05, 0.4, True, "12.5", classes)
 
-    def used_on(number, **layers):
-        service = make_service(replace(flat, ground_class=number + 0.0 * numbers, **layers))
-        service.settings = load_settings(learn="use")
+    def learned_on(number, **layers):
+        terrain = replace(flat, ground_class=np.full(shape, float(number)), **layers)
+        service = make_service(terrain, learn="use")
         service.take_ground(ground)
-        return service, friction_used(service)
+        return service
 
     told = friction_used(make_service(flat))
-    service, used = used_on(1)
-    assert used == pytest.approx(0.8 / 0.4 * told, rel=1e-6)
+    service = learned_on(1)
     assert service.snapshot().known_map is service.snapshot().known_map  # packed once
     assert asdict(Register().identify("", "", service.snapshot()))["ground_classes"] == {"1": 0.4}
-    assert used_on(2)[1] == pytest.approx(told, rel=1e-6)  # nothing slipped there
-    assert used_on(3)[1] == pytest.approx(told, rel=1e-6)  # no wheel was there
-    assert used_on(np.nan)[1] == pytest.approx(0.8 / 0.5 * told, rel=1e-6)
-    own = np.full(flat.elevation.shape, 0.6)
-    assert used_on(1, friction=own)[1] == pytest.approx(0.8 / 0.6 * told, rel=1e-6)
-    service.settings = load_settings()
-    assert friction_used(service) == pytest.approx(told, rel=1e-6)
+    # On class 2 nothing slipped, and on class 3 no wheel was.
+    for number, friction in {1: 0.4, 2: 0.8, 3: 0.8, np.nan: 0.5}.items():
+        used = friction_used(learned_on(number))
+        assert used == pytest.approx(0.8 / friction * told, rel=1e-6)
+    own = learned_on(1, friction=np.full(shape, 0.6))
+    assert friction_used(own) == pytest.approx(0.8 / 0.6 * told, rel=1e-6)
 
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():

@@ -210,12 +210,9 @@ def test_a_closed_link_leaves_no_thread_and_no_context():
 
 def test_a_stream_gets_stale_and_a_result_never():
     now = time.monotonic()
-    odometry, plan, none, fresh = (
-        TopicAge(now - MAX_AGE - 22.0, True),
-        TopicAge(now - MAX_AGE - 22.0, False),
-        TopicAge(None, True),
-        TopicAge(now, True),
-    )
+    old = now - MAX_AGE - 22.0
+    odometry, plan = TopicAge(old, True), TopicAge(old, False)
+    none, fresh = TopicAge(None, True), TopicAge(now, True)
     assert [one.is_stale for one in (odometry, plan, none, fresh)] == [True, False, False, False]
     assert odometry.describe() == plan.describe() == f"{MAX_AGE + 22.0:.0f} s"
     assert none.describe() == "nothing yet"
