@@ -24,13 +24,6 @@ MARGIN = 0.2
 """Margin of the start footprint that reaches from the wheels to where the camera sees [m]."""
 
 
-def standing_of(state):
-    """Return pose and suspension of a plant's state."""
-    roll, pitch, yaw = rpy_from_xyzw(tuple(state.orientation.tolist()))
-    suspension = {name: state.joint_positions[name] for name in SUSPENSION_JOINTS}
-    return Standing(*state.position.tolist(), roll, pitch, yaw, suspension)
-
-
 class Drive:
     """A simulated rover whose camera has looked once, and a server that knows no more."""
 
@@ -44,8 +37,11 @@ class Drive:
 
     def look(self) -> None:
         """Give the server the map that the camera sees now."""
-        state, yaw = self.simulation.plant.state(), float(self.simulation.plant.pose()[2])
-        standing, seen = standing_of(state), self.simulation.look(state.position, yaw)
+        state = self.simulation.plant.state()
+        attitude = rpy_from_xyzw(tuple(state.orientation.tolist()))
+        suspension = {name: state.joint_positions[name] for name in SUSPENSION_JOINTS}
+        standing = Standing(*state.position.tolist(), *attitude, suspension)
+        seen = self.simulation.look(state.position, attitude[2])
         now = self.keeper.take(seen, "elevation_cloud", self.time, standing)
         self.service.take_terrain(now.terrain, "elevation_cloud", None, now.sources)
 

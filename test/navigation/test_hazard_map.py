@@ -66,16 +66,14 @@ def classes_of_judgements(on_map: RoverOnMap, poses) -> np.ndarray:
 )  # fmt: skip
 def test_a_pose_has_the_class_that_a_path_there_would_have(kind, name):
     cell = 0.1 if name == "m2020" else 0.05
-    terrain, options = rough(7, (90, 100), cell, 1.0 if kind == "rough" else 0.3), OPTIONS
+    terrain = rough(7, (90, 100), cell, 1.0 if kind == "rough" else 0.3)
     shape = terrain.elevation.shape
-    if kind == "soil":
-        options = replace(OPTIONS, soil="mars_simulant")
-    if kind == "layers":
-        friction = np.random.default_rng(1).uniform(0.1, 1.0, shape)
-        terrain = replace(terrain, friction=friction)
-    if kind == "uncertain":
-        terrain = replace(terrain, elevation_std=np.full(shape, 0.004))
-    on_map = RoverOnMap(load_rover(name), terrain, options)
+    options = replace(OPTIONS, soil="mars_simulant" if kind == "soil" else None)
+    layers = {
+        "layers": {"friction": np.random.default_rng(1).uniform(0.1, 1.0, shape)},
+        "uncertain": {"elevation_std": np.full(shape, 0.004)},
+    }
+    on_map = RoverOnMap(load_rover(name), replace(terrain, **layers.get(kind, {})), options)
     poses = poses_of(terrain, 150 if kind in ("soil", "uncertain") else 300)
     found = classify_poses(on_map, poses)
     np.testing.assert_array_equal(found, classes_of_judgements(on_map, poses))

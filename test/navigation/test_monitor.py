@@ -118,16 +118,6 @@ def test_a_wall_that_is_certain_stops_before_the_errors_of_the_map_are_allowed_f
     assert (found.judgement.candidate.prediction.bounds is None) == is_exact
 
 
-def test_the_rest_is_judged_once_for_each_map(service, monitor):
-    one = sight(service, STRAIGHT[10], 10.0)
-    judged = [monitor.look(replace(one, time=10.0 + 0.1 * k)).judged for k in range(5)]
-    assert judged == [2] * 5
-    settings = service.settings
-    service.settings = replace(settings, query=settings.query.change(friction=0.6))
-    assert monitor.look(sight(service, STRAIGHT[10], 20.0)).judged == 3
-    service.settings = settings
-
-
 def test_on_learned_ground_the_rest_is_judged_once_too():
     learned = make_service(make_terrain(waves), learn="use")
     learned.take_ground(LearnedGround(0.7, 0.05, 0.6, True))

@@ -59,14 +59,10 @@ def write_tif(path, heights, **changes):
     return path
 
 
-def survey_tif(path, request, out, **changes):
-    return compute_here(prepare_survey(request, str(path), out, **changes))
-
-
 def test_corners_and_projection_come_back(tmp_path):
     heights = make_rough_map(20, 30).elevation.astype(np.float32)
     path = write_tif(tmp_path / "map.tif", heights[::-1], nodata=np.nan)
-    prepared = survey_tif(path, make_request(), tmp_path / "out")
+    prepared = compute_here(prepare_survey(make_request(), str(path), tmp_path / "out"))
     write_layers(prepared.store, tmp_path / "layers")
     with rasterio.open(path) as there:
         for name in prepared.store.notes.layers:

@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settling: all six wheels touch, where MuJoCo says; the belly is clear of what is below."""
+"""Settling: all six wheels touch, where MuJoCo says and on rough ground; the belly is clear."""
+
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import PoseStatus, Terrain, judge_path, judge_poses
+from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import reference_predictions, steered_predictions
-from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
-from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gaps
+from support.rough_grounds import bouldered, fractal, plane, random_poses, rocky, smooth
+from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gap, wheel_gaps
 from support.rovers import LSR1
 
 slopes = st.floats(-0.4, 0.4)
-headings = st.floats(-np.pi, np.pi)
 both_sets = pytest.mark.parametrize(
     ("predict", "count"),
     [(reference_predictions, 81), (steered_predictions, 21)],
@@ -83,6 +84,51 @@ def test_a_wheel_whose_rim_touches_the_edge_of_a_step_settles():
     assert gaps.min() >= -1e-4
 
 
+few_and_all = pytest.mark.parametrize("seeds", [1, pytest.param(10, marks=pytest.mark.long)])
+EVERY = 50
+"""Of so many poses one wheel of one pose is looked at by brute force."""
+
+
+@lru_cache(maxsize=1)
+def rough_predictions(seeds: int) -> list[tuple[Terrain, PathPrediction]]:
+    """Return grounds with 1000 poses each, two of each seed."""
+    grounds = [make(seed) for make in (fractal, bouldered) for seed in range(seeds)]
+    return [
+        (ground, judge_path(LSR1, ground, random_poses(k, 1000, 2.0))[0])
+        for k, ground in enumerate(grounds)
+    ]
+
+
+@few_and_all
+def test_999_in_1000_poses_settle_on_rough_ground(seeds):
+    statuses = np.concatenate([prediction.status for _, prediction in rough_predictions(seeds)])
+    assert set(statuses.tolist()) <= {PoseStatus.SETTLED, PoseStatus.NOT_SETTLED}
+    assert (statuses == PoseStatus.SETTLED).mean() >= 0.999
+
+
+@few_and_all
+def test_999_of_1000_wheels_touch_within_a_tenth_of_a_millimetre_and_none_is_in_the_air(seeds):
+    gaps = []
+    for ground, prediction in rough_predictions(seeds):
+        for k, i in enumerate(np.flatnonzero(prediction.settled)[::EVERY]):
+            centre, axis = prediction.wheel_centres[i, k % 6], wheel_axes(LSR1, prediction, i)
+            gaps.append(wheel_gap(LSR1, ground, centre, axis[k % 6]))
+    gaps = np.array(gaps)
+    assert gaps.size >= 39 * seeds
+    assert (np.abs(gaps) <= 1e-4).mean() >= 0.999
+    assert gaps.min() >= -1e-3 and gaps.max() <= 1e-4
+
+
+def test_no_rim_sinks_into_steep_cells_almost_as_large_as_the_wheel():
+    heights = np.random.default_rng(0).normal(0.0, 0.13, (61, 61))
+    ground, poses = Terrain(heights, 0.09, (-2.7, -2.7)), random_poses(0, 40, 1.5)
+    prediction = judge_poses(LSR1, ground, poses, np.zeros(len(poses)))[0]
+    settled = np.flatnonzero(prediction.settled)
+    assert settled.size >= 39
+    gaps = np.array([wheel_gaps(LSR1, ground, prediction, i) for i in settled])
+    assert gaps.min() >= -1e-4
+
+
 @both_sets
 def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
     for case, prediction, i in waypoints_of(predict()):
@@ -97,7 +143,7 @@ def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
 
 
 @settings(max_examples=10)
-@given(slopes, slopes, st.floats(-5.0, 5.0), headings)
+@given(slopes, slopes, st.floats(-5.0, 5.0), st.floats(-np.pi, np.pi))
 def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw):
     prediction = judge_path(LSR1, plane(slope_x, slope_y, height), [[0.1, -0.05, yaw]])[0]
     assert prediction.settled.all()

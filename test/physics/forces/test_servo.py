@@ -31,7 +31,6 @@ SOFT = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
 SAND = replace(SERVO, soil="lete_sand", max_torque=20.0)
 POSE = np.zeros((1, 3))
 soils = st.sampled_from(SOFT)
-few = settings(max_examples=12)
 
 
 def with_droop(rover, droop):
@@ -137,7 +136,7 @@ def test_energy_and_time_count_slip_and_droop(slope, soil):
     assert rim * (1.0 - servo.slip_ratio[0]) == pytest.approx(servo.speed_share[0], abs=0.02)
 
 
-@few
+@settings(max_examples=12)
 @given(soils, st.floats(0.02, 0.4))
 def test_a_rover_drives_where_its_wheels_can_pull_and_slides_where_they_cannot(soil, slope):
     options = replace(SERVO, soil=soil, max_torque=1e4)

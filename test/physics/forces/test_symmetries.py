@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Symmetries: mirrored, turned, moved, heavier or the other way round, the answer is the same."""
+"""Symmetries: mirrored, turned, moved, larger, heavier or the other way round, it is the same."""
 
 from dataclasses import replace
 
@@ -8,10 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import Terrain, judge_poses
-from support.rough_grounds import random_poses, scaled_for, smooth
+from rover_physics import Rover, SweepOptions, Terrain, judge_paths, judge_poses
+from support.paths import arc_of, poses_at
+from support.rough_grounds import (
+    bouldered,
+    enlarged,
+    random_poses,
+    rocky,
+    scaled_for,
+    smooth,
+    with_std,
+)
 from support.rover_geometry import ANGLE, GAP, turned_round
-from support.rovers import LSR1, M2020
+from support.rovers import LSR1, M2020, SIMILAR, similar
 
 SWAP = [3, 4, 5, 0, 1, 2]
 ROUND = [5, 4, 3, 2, 1, 0]
@@ -97,3 +106,50 @@ def test_a_bogie_behind_is_a_bogie_ahead_driven_backwards(seed, rover):
         ("tip_over_ratio", here.tip_over_ratio, 1e-3),
     ):
         assert getattr(there, name) == pytest.approx(expected, abs=tolerance), name
+
+
+# Of another size, mass or gravity
+
+RATIOS = (
+    "status", "contact_angle", "friction_utilisation", "torque_saturation", "slip_ratio",
+    "tip_over_ratio", "tip_over_force_angle", "speed_share", "falling", "roll", "pitch",
+)  # fmt: skip
+LENGTHS = ("belly_clearance", "wheel_drop", "lift_height", "wheel_centres", "distance")
+
+PATHS = [
+    arc_of(bend, 0.02 * np.arange(50), yaw) + poses_at(-0.9, y)
+    for y in (-0.8, 0.2)
+    for yaw, bend in ((0.0, 0.0), (0.4, 0.7))
+]
+
+
+def judge(rover: Rover, ground: Terrain, policy: str):
+    """Yield what is told of each of PATHS on ground as large as the rover, without units."""
+    size = rover.wheel.radius / LSR1.wheel.radius
+    paths = [path * [size, size, 1.0] for path in PATHS]
+    asked = rover, enlarged(ground, size), paths, SweepOptions(policy=policy)
+    judged = judge_paths(*asked, accepted_chance=0.05)
+    for prediction, verdict in judged:
+        yield "verdict", (verdict.codes, verdict.first_failure, verdict.failure_chance)
+        for name in RATIOS:
+            yield name, getattr(prediction, name)
+        for name in LENGTHS:
+            yield name, getattr(prediction, name) / size
+        yield "wheel_loads", prediction.wheel_loads / rover.weight
+
+
+@pytest.mark.parametrize("like", SIMILAR)
+@pytest.mark.parametrize(
+    ("ground", "policy"),
+    [
+        (with_std(smooth(3), 0.004), "equal"),
+        (bouldered(2), "servo"),
+        (rocky(1), "servo"),
+        (rocky(1), "optimal"),
+    ],
+    ids=["uncertain", "boulders", "rocks", "control"],
+)
+def test_similar_rovers_get_the_same_verdict_to_the_bit(ground, policy, like):
+    there = judge(similar(LSR1, *SIMILAR[like]), ground, policy)
+    for (name, expected), (_, found) in zip(judge(LSR1, ground, policy), there, strict=True):
+        np.testing.assert_equal(found, expected, err_msg=name)

@@ -24,7 +24,6 @@ from support.rover_geometry import balance_matrix
 from support.rovers import LSR1, M2020
 
 STEP = reference_ground("settled_a/step")
-few = settings(max_examples=10)
 
 
 @pytest.mark.parametrize("max_torque", [2.0, 0.4])
@@ -179,7 +178,7 @@ def has_equal_shares(prediction, i) -> bool:
     return bool(np.abs(left).max() <= 1e-6 * LSR1.weight)
 
 
-@few
+@settings(max_examples=10)
 @given(st.integers(0, 1000), st.floats(-3.0, 3.0), st.sampled_from([None, "dry_sand"]))
 def test_torques_that_a_policy_uses_are_within_the_ranges(seed, yaw, soil):
     ground, pose = smooth(seed), [[0.1, 0.2, yaw]]

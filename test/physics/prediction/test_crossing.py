@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Between waypoints: faces are climbed through steep contacts, and wheels drop off edges."""
+"""Between waypoints: faces are climbed, wheels drop off edges, and wedge in slots."""
 
 from dataclasses import replace
 
@@ -192,3 +192,19 @@ def test_while_a_wheel_falls_neither_friction_nor_torque_are_asked_for():
 def test_a_slope_too_slippery_to_stand_on_is_refused_for_friction_and_not_a_fall():
     prediction, verdict = drive(plane(-0.5, 0.0, half=2.0), friction=0.3)
     assert verdict.code == "friction" and not prediction.wheel_drop.any()
+
+
+@pytest.mark.parametrize("policy", ["optimal", "servo"])
+def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged(policy):
+    wide, narrow = (
+        drive(drive_ground("ditch", width), policy=policy, friction=0.86, max_torque=2.44)[1]
+        for width in (0.194, 0.10)
+    )
+    assert wide.code == "friction" and "wedged" in wide.reason
+    assert narrow.traversable
+
+
+def test_a_wedged_rover_is_refused_with_any_friction_in_all_samples():
+    options = SweepOptions("optimal", friction=0.86, max_torque=2.44)
+    asked = FREE, drive_ground("ditch", 0.194), [drive_path()], options
+    assert judge_paths(*asked, accepted_chance=1.0)[0][1].failure_chance == 1.0

@@ -34,9 +34,7 @@ from support.rover_geometry import place_rover
 from support.rovers import LSR1, M2020
 
 LEVEL = plane(0.0, 0.0)
-POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
-few = settings(max_examples=8)
 
 
 def line(start: float, end: float, count: int = 41) -> np.ndarray:
@@ -71,10 +69,10 @@ def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
 )
 def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
     with pytest.raises(RoverError, match=words):
-        judge_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))[0]
+        judge_path(LSR1, LEVEL, [[0.0, 0.0, 0.0]], SweepOptions(**arguments))[0]
 
 
-@few
+@settings(max_examples=8)
 @given(st.integers(0, 10_000), st.integers(1, 70))
 def test_any_choice_of_poses_gives_identical_rows(seed, count):
     ground, poses = rocky(1), random_poses(1, 70, 2.6)

@@ -107,11 +107,7 @@ def test_an_unsolved_program_falls_back_to_equal_torques_and_those_on_demand_are
     assert not wanted.fallback and np.ptp(wanted.torques) < 1e-12
 
 
-def test_what_makes_no_sense_is_refused():
-    with pytest.raises(ModelError, match="friction"):
-        solve(LSR1, level(), friction=np.zeros(6))
-    with pytest.raises(ModelError, match="must all be above 0"):
-        solve(LSR1, level(), torque=-1.0)
+def test_contact_angles_without_equilibrium_are_refused():
     with pytest.raises(ModelError, match="contact angles"):
         BalanceWriter(LSR1).write(level(np.full(6, np.pi / 2) * [1, 1, 1, -1, -1, -1]), 0.0)
 

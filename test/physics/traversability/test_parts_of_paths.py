@@ -99,9 +99,7 @@ def unknown(start: float) -> Terrain:
 CASES = {
     "backwards": (GROUND, straight(-3.0)[::-1].copy(), SweepOptions(backward=True)),
     "slippery": (GROUND, straight(-1.0), SweepOptions(friction=0.4)),
-    "sand": (GROUND, straight(3.0), SweepOptions(soil="dry_sand")),
     "margin": (GROUND, straight(3.0), SweepOptions("optimal", control_margin=0.3, friction=0.5)),
-    "high stairs": (steps_down(0.05), straight(0.0), SweepOptions("optimal", friction=0.9)),
     "ledges": (steps_down(0.16), straight(0.0), SweepOptions()),
     "unknown ground": (unknown(8.0), straight(-3.0), SweepOptions()),
     "uncertain": (with_std(GROUND, 0.003), straight(-3.0, 2.0), SweepOptions(friction=0.7)),

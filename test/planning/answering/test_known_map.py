@@ -20,10 +20,6 @@ SECOND = 10**9
 FLAT = Terrain(np.zeros((30, 30)), 0.1)
 
 
-def known(stamp, arrival=0.0):
-    return KnownMap(FLAT, FLAT, "a topic", stamp, arrival, fingerprint(FLAT))
-
-
 @pytest.mark.parametrize(
     ("stamp", "ros_time", "steady", "age", "told"),
     [
@@ -36,7 +32,8 @@ def known(stamp, arrival=0.0):
 def test_the_longer_of_both_ages_counts_and_the_future_is_told_apart(
     stamp, ros_time, steady, age, told
 ):
-    there = known(None if stamp is None else stamp * SECOND)
+    stamp = None if stamp is None else stamp * SECOND
+    there = KnownMap(FLAT, FLAT, "a topic", stamp, 0.0, fingerprint(FLAT))
     assert there.age(ros_time * SECOND, steady) == pytest.approx(age)
     assert re.search(told, there.describe_age(ros_time * SECOND, steady, 5.0))
 

@@ -16,7 +16,8 @@ from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
 from support.grounds import make_terrain, raised, rocky, wall_at, waves
 from support.rough_grounds import with_std
-from support.services import make_service
+from support.rovers import LSR1
+from support.services import load_settings, make_service
 
 FAN = {"planner": "fan", "candidate_count": 1}
 """Parameters of a service that does not search."""
@@ -27,12 +28,14 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     uncertain = with_std(certain, 0.005)
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain, **FAN)
-    refused = service.snapshot().answer(start, goal).report.to_dict()
+    judged = service.snapshot().answer(start, goal)
+    assert judged.candidate.verdict.risk > 1.0  # that of the bounds
+    refused = judged.report.to_dict()
     assert not refused["traversable"]
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
     assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
-    service.settings = make_service(map_sigmas=0.0, **FAN).settings
+    service.settings = load_settings(map_sigmas=0.0, **FAN)
     passed = service.snapshot().answer(start, goal).report.to_dict()
     assert passed["traversable"] and passed["map_sigmas"] == 0.0
     assert passed["friction_utilisation_bound"] is None
@@ -90,40 +93,47 @@ def test_a_learned_friction_changes_new_questions_only_if_it_is_to_be_used(
     assert report["ground_since"] == ("" if learn == "off" else "12.5")
 
 
+@pytest.mark.parametrize(("is_bounded", "spread"), [(False, 0.1), (True, 0.05)])
+def test_a_friction_that_was_not_measured_is_as_uncertain_as_the_told_one(is_bounded, spread):
+    learned = LearnedGround(0.8, 0.04, 0.0, is_bounded).change(LSR1)
+    assert learned.uncertainty.friction == pytest.approx(spread)
+
+
 def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     flat = make_terrain(waves)
-    numbers = np.full(flat.elevation.shape, 2.0)
+    shape = flat.elevation.shape
     grip = LearnedGround(0.9, 0.2, 0.1, is_bounded=False)
     classes = {1: LearnedGround(0.4, 0.02, 0.36, is_bounded=True), 2: grip}
     ground = LearnedGround(0.5, 0.05, 0.4, True, "12.5", classes)
 
-    def used_on(number, **layers):
-        service = make_service(replace(flat, ground_class=number + 0.0 * numbers, **layers))
-        service.settings = make_service(learn="use").settings
+    def learned_on(number, **layers):
+        terrain = replace(flat, ground_class=np.full(shape, float(number)), **layers)
+        service = make_service(terrain, learn="use")
         service.take_ground(ground)
-        return service, friction_used(service)
+        return service
 
     told = friction_used(make_service(flat))
-    service, used = used_on(1)
-    assert used == pytest.approx(0.8 / 0.4 * told, rel=1e-6)
-    assert service.snapshot().known_map is service.snapshot().known_map  # packed once
+    service = learned_on(1)
+    laid = service.snapshot().known_map
+    assert service.snapshot().known_map is laid  # packed once
+    service.renew_map(None)
+    assert service.snapshot().terrain is laid.terrain
     assert asdict(Register().identify("", "", service.snapshot()))["ground_classes"] == {"1": 0.4}
-    assert used_on(2)[1] == pytest.approx(told, rel=1e-6)  # nothing slipped there
-    assert used_on(3)[1] == pytest.approx(told, rel=1e-6)  # no wheel was there
-    assert used_on(np.nan)[1] == pytest.approx(0.8 / 0.5 * told, rel=1e-6)
-    own = np.full(flat.elevation.shape, 0.6)
-    assert used_on(1, friction=own)[1] == pytest.approx(0.8 / 0.6 * told, rel=1e-6)
-    service.settings = make_service().settings
-    assert friction_used(service) == pytest.approx(told, rel=1e-6)
+    # On class 2 nothing slipped, and on class 3 no wheel was.
+    for number, friction in {1: 0.4, 2: 0.8, 3: 0.8, np.nan: 0.5}.items():
+        used = friction_used(learned_on(number))
+        assert used == pytest.approx(0.8 / friction * told, rel=1e-6)
+    own = learned_on(1, friction=np.full(shape, 0.6))
+    assert friction_used(own) == pytest.approx(0.8 / 0.6 * told, rel=1e-6)
 
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     service = make_service(raised(make_terrain(waves), (80, 80), np.nan))
     assert np.isnan(service.terrain.elevation[80, 80])
-    service.settings = make_service(unknown_cells="interpolate").settings
+    service.settings = load_settings(unknown_cells="interpolate")
     service.refresh_map()
     assert np.isfinite(service.terrain.elevation[80, 80])
-    service.settings = make_service().settings
+    service.settings = load_settings()
     service.refresh_map()
     assert np.isnan(service.terrain.elevation[80, 80])
 
