@@ -25,14 +25,13 @@ FLAT = Terrain(np.zeros((30, 30)), 0.1)
     [
         (None, 50, 3.0, 3.0, "^$"),
         (None, 50, 6.0, 6.0, "is 6.0 s old"),
-        (10, 15, 3.0, 5.0, "^$"),
-        (3600, 15, 3.0, 3.0, "3585.0 s in the future"),
+        (10 * SECOND, 15, 3.0, 5.0, "^$"),
+        (3600 * SECOND, 15, 3.0, 3.0, "3585.0 s in the future"),
     ],
 )
 def test_the_longer_of_both_ages_counts_and_the_future_is_told_apart(
     stamp, ros_time, steady, age, told
 ):
-    stamp = None if stamp is None else stamp * SECOND
     there = KnownMap(FLAT, FLAT, "a topic", stamp, 0.0, fingerprint(FLAT))
     assert there.age(ros_time * SECOND, steady) == pytest.approx(age)
     assert re.search(told, there.describe_age(ros_time * SECOND, steady, 5.0))
