@@ -27,7 +27,9 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     uncertain = with_std(certain, 0.005)
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain, **FAN)
-    refused = service.snapshot().answer(start, goal).report.to_dict()
+    judged = service.snapshot().answer(start, goal)
+    assert judged.candidate.verdict.risk > 1.0  # that of the bounds
+    refused = judged.report.to_dict()
     assert not refused["traversable"]
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
