@@ -135,6 +135,14 @@ def test_an_input_that_is_bad_every_other_time_is_one_fault():
     assert rig.run(RECOVERY_TIME + 0.1).state == "driving"
 
 
+def test_a_fault_found_elsewhere_counts_from_the_next_update_on():
+    rig = Rig()
+    rig.run(1.0)
+    rig.supervisor.trip("updates came too late")
+    assert rig.run(RECOVERY_TIME - PERIOD).fault == "updates came too late"
+    assert rig.run(1.0).state == "driving"
+
+
 def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_otherwise():
     rig = Rig(stall_time=2.0)
     rig.rate = 0.0
