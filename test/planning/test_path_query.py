@@ -4,6 +4,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from rover_planner.planning import path_query
 from support.grounds import make_terrain
