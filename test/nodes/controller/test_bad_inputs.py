@@ -9,33 +9,27 @@ from geometry_msgs.msg import Twist
 
 from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros import subscriptions
+from support.messages import set_field
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
 CYCLES_IN_A_TENTH = 5
 
 
-def nan_rate(rover):
-    rover.joints.velocity[JOINTS.index("front_right_wheel")] = math.nan
-
-
-def other_frame(rover):
-    rover.imu.header.frame_id = "imu_link"
-
-
-GOOD = "all inputs are right"
+GOOD, NANS = "all inputs are right", [math.nan] * len(JOINTS)
+OTHER_FRAME = "imu is in frame 'imu_link'; it must be in 'base_link', or the parameters"
 SPOILS = [
-    (nan_rate, "velocity nan of front_right_wheel"),
-    (other_frame, "imu is in frame 'imu_link'; it must be in 'base_link', or the parameters"),
+    ("joints.velocity", NANS, "velocity nan of rocker_right"),
+    ("imu.header.frame_id", "imu_link", OTHER_FRAME),
 ]
 
 
 def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
     ros, rover, controller
 ):
-    for spoil, text in SPOILS:
+    for field, value, text in SPOILS:
         kept = copy.deepcopy(rover.joints), copy.deepcopy(rover.imu)
-        spoil(rover)
+        set_field(rover, field, value)
         spoilt = rover.wait_for_send()
         wait_until(lambda: rover.state == "fault", "the fault")
         wait_until(lambda text=text: rover.count_lines(text), "the reason in the log")
