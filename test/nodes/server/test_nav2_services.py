@@ -89,5 +89,7 @@ def test_a_path_to_a_pose_is_the_plan_of_can_traverse_and_a_goal_without_one_has
     wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
     _, result = compute(server, None, goal)
     np.testing.assert_allclose(path_to_poses(result.path, "map"), plan, atol=1e-9)
+    by_the_edge = 0.0, 3.95, 0.5 * np.pi  # on the map, but wheels are not
+    assert code_of(server, start, by_the_edge) == 208
     server.service.take_terrain(make_terrain(wall_at(0.5)))
     assert code_of(server, start, (1.5, 0.0, 0.0)) == 208
