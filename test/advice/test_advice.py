@@ -16,7 +16,6 @@ from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_withi
 from rover_planner.advice.case import Case
 from rover_planner.advice.levers import LEVERS, Choice
 from rover_planner.advice.path_changes import bend_path
-from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
@@ -82,21 +81,16 @@ def test_each_remedy_passes_by_the_options_and_the_path_that_are_told(advised):
         assert 0.0 < told["largest_use"] <= 1.0
 
 
-def set_less(remedy: Remedy, share: float) -> Case | None:
-    """Return the case with a lever set to a little less, by a share of its range."""
-    (one,) = remedy.levers
-    span = one.lever.settings(remedy.refusal)
-    end = max(span.ends, key=lambda end: (end - span.now) * (one.value - span.now))
-    value = one.value - share * (end - span.now)
-    return one.lever.apply(remedy.refusal.case, remedy.refusal, value)
-
-
 def test_a_little_less_of_a_remedy_is_refused(advised):
     for remedy in advised[0].found:
-        if isinstance(remedy.levers[0].lever.settings(remedy.refusal), Choice):
+        (one,) = remedy.levers
+        span = one.lever.settings(remedy.refusal)
+        if isinstance(span, Choice):
             continue
-        less = set_less(remedy, 1.01 * TOLERANCE)
-        assert not less.judge().passes, remedy.describe()
+        end = max(span.ends, key=lambda end: (end - span.now) * (one.value - span.now))
+        less = one.value - 1.01 * TOLERANCE * (end - span.now)
+        case = one.lever.apply(remedy.refusal.case, remedy.refusal, less)
+        assert not case.judge().passes, remedy.describe()
 
 
 def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):

@@ -90,11 +90,6 @@ def test_damaged_bytes_are_refused(message, lengths):
             SensorReader().read(whole[:length], kind)
 
 
-def test_the_data_of_a_cloud_are_read_where_they_are():
-    message = serialize_message(cloud())
-    assert SensorReader().read(message, PointCloud2).data.obj is message
-
-
 def test_the_joints_of_several_publishers_keep_their_names():
     reader = SensorReader()
     for names in (["a", "b"], ["c"], [], ["a", "b"], ["a", "b"]):

@@ -39,10 +39,7 @@ def judged(terrain, headings=2, rover=LSR1) -> HazardMap:
 
 def poses_of(terrain, count=120):
     x0, x1, y0, y1 = terrain.bounds
-    rng = np.random.default_rng(5)
-    return np.column_stack(
-        [rng.uniform(x0, x1, count), rng.uniform(y0, y1, count), rng.uniform(-3, 3, count)]
-    )
+    return np.random.default_rng(5).uniform((x0, y0, -3.0), (x1, y1, 3.0), (count, 3))
 
 
 def classes_of_judgements(on_map: RoverOnMap, poses) -> np.ndarray:

@@ -15,7 +15,6 @@ from std_msgs.msg import Bool, String
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.sensing import imu_message
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics import Terrain
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steered_drive import SteeredDrive
@@ -43,7 +42,7 @@ class Rover(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("rover", context=ros.context)
-        self._map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        self.map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
         self.senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
         self.estimates = hear(self, String, ground_learner.ESTIMATE, latched_qos())
@@ -58,12 +57,7 @@ class Rover(Node):
 
     def is_heard(self) -> bool:
         """Return whether all topics are connected."""
-        return all(s.get_subscription_count() for s in (*self.senders.values(), self._map))
-
-    def send_map(self, terrain: Terrain) -> None:
-        """Send the map."""
-        stamp = ns_to_stamp(int(BEGIN * 1e9))
-        self._map.publish(terrain_to_point_cloud(terrain, "map", stamp))
+        return all(s.get_subscription_count() for s in (*self.senders.values(), self.map))
 
     def send(self, row: np.ndarray, begin: float = BEGIN) -> None:
         """Send what a row holds; the joints first, which the row of the odometry has."""
@@ -105,7 +99,8 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     ground = ramp(SLOPE)
-    rover.send_map(replace(ground, ground_class=np.full(ground.elevation.shape, 7.0)))
+    ground = replace(ground, ground_class=np.full(ground.elevation.shape, 7.0))
+    rover.map.publish(terrain_to_point_cloud(ground, "map", ns_to_stamp(int(BEGIN * 1e9))))
     wait_until(lambda: node.learner is not None, "the map")
     rows = climb(LSR1, SLOPE, 12.0)[::5]
     rows[60:, X] = rows[60, X] + 1e-4 * np.random.default_rng(1).standard_normal(60)

@@ -57,8 +57,6 @@ def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_ena
     assert rig.run(1.0).state == "disabled"
     assert supervisor.set_enabled(True)[0]
     assert rig.run(PERIOD).state == "driving"
-    assert supervisor.set_enabled(False) == (True, "disabled")
-    assert rig.run(PERIOD).state == "disabled"
 
 
 def test_the_watch_of_the_path_holds_the_rover_and_where_it_is_expected_so_does_its_silence():
@@ -133,6 +131,14 @@ def test_an_input_that_is_bad_every_other_time_is_one_fault():
             rig.run(PERIOD)
     assert [command.state for command in rig.commands] == ["driving"] + 99 * ["fault"]
     assert rig.run(RECOVERY_TIME + 0.1).state == "driving"
+
+
+def test_a_fault_found_elsewhere_counts_from_the_next_update_on():
+    rig = Rig()
+    rig.run(1.0)
+    rig.supervisor.trip("updates came too late")
+    assert rig.run(RECOVERY_TIME - PERIOD).fault == "updates came too late"
+    assert rig.run(1.0).state == "driving"
 
 
 def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_otherwise():

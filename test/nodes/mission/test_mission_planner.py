@@ -36,28 +36,6 @@ def test_ros_that_is_shut_down_while_the_node_waits_is_the_end_of_waiting(planne
         planner.wait_for_server()
 
 
-def test_errors_while_the_node_waits_are_told(planner):
-    planner.create_timer(0.01, lambda: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        planner.wait_for_server()
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        (["--start=0,0,0"], "--goal"),
-        (["--start=0,0", "--goal=1,0,0"], "'0,0' is no pose; it must be X,Y,YAW"),
-        (["--start=0,0,0", "--goal=1,0,0", "--map=opportunity"], "presets are spirit"),
-        (["--start=0,0,0", "--goal=1,0,0", "--timeout=nan"], "timeout is nan; it must be a time"),
-    ],
-)
-def test_bad_words_are_exit_code_2_with_one_line(capfd, words, names):
-    assert main(words) == 2
-    err = capfd.readouterr().err
-    assert err.startswith("mission_planner: ") and err.count("\n") == 1 and len(err) <= 301
-    assert names in err
-
-
 def test_negative_numbers_need_no_equals_sign_and_words_of_ros_are_put_aside():
     words = ["--start", "-3", "0", "0", "--goal=-.5", "-1e-1", "0"]
     ros_words = ["--ros-args", "-r", "__node:=planner", "-p", "use_sim_time:=true"]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
-from rclpy.node import Node
 
 from msg_adapters.results.grids import VALUES
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
@@ -27,16 +26,10 @@ def rock_at(place):
     return lambda x, y: waves(x, y) + 0.5 * ((abs(x - place) < 0.3) & (abs(y - place) < 0.3))
 
 
-class Costmap(Node):
-    """A subscriber such as the static layer of a costmap."""
-
-    def __init__(self, ros, names):
-        super().__init__("costmap", context=ros.context)
-        self.grids = {
-            name: hear(self, OccupancyGrid, f"{SERVER}/hazard_map/{name}", latched_qos())
-            for name in names
-        }
-        self.ask = self.create_client(GetMap, f"{SERVER}/get_hazard_map")
+def hear_grids(client, *names):
+    """Return lists that get the grids which are published from now on, by name of the topic."""
+    topics = (f"{SERVER}/hazard_map/{name}" for name in names)
+    return [hear(client, OccupancyGrid, topic, latched_qos()) for topic in topics]
 
 
 def cells(grid, x=(-1.0, 1.0), y=(-1.0, 1.0)):
@@ -59,6 +52,11 @@ def has_rock(grids):
     return (cells(grids[-1], *THERE) == IMPASSABLE).any()
 
 
+def ask_for_grid(client):
+    ask = client.create_client(GetMap, f"{SERVER}/get_hazard_map")
+    return call(ask, GetMap.Request()).map
+
+
 @pytest.fixture
 def mapping(start_server, client):
     server = start_server(hazard_map=True, hazard_headings=2)
@@ -66,18 +64,17 @@ def mapping(start_server, client):
     return server
 
 
-def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client, ros):
-    costmap = ros.spin(Costmap(ros, ("worst", "best", "heading_1")))
-    for grids in costmap.grids.values():
+def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client):
+    worst, best, first = hear_grids(client, "worst", "best", "heading_1")
+    for grids in (worst, best, first):
         wait_until(lambda grids=grids: is_free(grids), "the whole map", 60.0)
-    worst, best = costmap.grids["worst"], costmap.grids["best"]
     grid, terrain = worst[-1], mapping.service.terrain
     assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(0.1)
     assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.05)
     assert (grid.info.height, grid.info.width) == terrain.elevation.shape
     assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
     wait_until(
-        lambda: call(costmap.ask, GetMap.Request()).map.data == worst[-1].data,
+        lambda: ask_for_grid(client).data == worst[-1].data,
         "the same map from the service",
     )
     client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
@@ -87,10 +84,9 @@ def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client, ros
 
 
 def test_switched_off_no_cell_is_free_and_switched_on_none_of_what_was_judged_before(
-    mapping, client, ros, monkeypatch
+    mapping, client, monkeypatch
 ):
-    costmap = ros.spin(Costmap(ros, ("worst", "heading_1")))
-    worst, first = costmap.grids["worst"], costmap.grids["heading_1"]
+    worst, first = hear_grids(client, "worst", "heading_1")
     judged, go_on = threading.Event(), threading.Event()
     wait_until(lambda: is_free(worst) and is_free(first), "the map", 60.0)
     show = HazardTopics._show
@@ -106,7 +102,7 @@ def test_switched_off_no_cell_is_free_and_switched_on_none_of_what_was_judged_be
     assert client.set_parameter("hazard_map", False)[0]
     for grids in (worst, first):
         wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
-    assert call(costmap.ask, GetMap.Request()).map.info.width == 0
+    assert ask_for_grid(client).info.width == 0
     client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
     assert client.set_parameter("hazard_map", True)[0]
     before = len(worst)

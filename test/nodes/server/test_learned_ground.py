@@ -30,6 +30,7 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
     for text in ("no JSON", bad, json.dumps(learned)):
         client.send(sender, String(data=text))
     wait_until(lambda: server.service.snapshot().ground is not None, "the estimate")
+    client.wait_for_log("ground_estimate not used: ~/ground_estimate: ")
     verdict = ask(client)[1]
     assert verdict["ground"] == "learned"
     assert float(verdict["ground_friction"]) == 0.5 and verdict["ground_since"]

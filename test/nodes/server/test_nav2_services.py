@@ -2,6 +2,7 @@
 """Nav2's questions: which poses of a path are not passable, and a path to a pose."""
 
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -14,18 +15,11 @@ from rover_planner.nodes.nav2_services import Nav2Services
 from support.grounds import make_terrain, wall_at, waves
 from support.waiting import wait_until
 
-COMPUTE_PATH_TO_POSE = {
-    "NONE": 0,
-    "UNKNOWN": 200,
-    "INVALID_PLANNER": 201,
-    "TF_ERROR": 202,
-    "START_OUTSIDE_MAP": 203,
-    "GOAL_OUTSIDE_MAP": 204,
-    "START_OCCUPIED": 205,
-    "GOAL_OCCUPIED": 206,
-    "TIMEOUT": 207,
-    "NO_VALID_PATH": 208,
-}
+ERRORS = (
+    "UNKNOWN", "INVALID_PLANNER", "TF_ERROR", "START_OUTSIDE_MAP", "GOAL_OUTSIDE_MAP",
+    "START_OCCUPIED", "GOAL_OCCUPIED", "TIMEOUT", "NO_VALID_PATH",
+)  # fmt: skip
+COMPUTE_PATH_TO_POSE = {"NONE": 0} | {name: 200 + k for k, name in enumerate(ERRORS)}
 """Constants of the result of the action in Nav2 1.3.13, as its sources have them; 1.3.0 has the
 same. Nav2 is not on PyPI."""
 
@@ -75,55 +69,44 @@ def test_the_action_is_remapped_by_its_name(ros, monkeypatch):
     assert names == ["/one/compute_path_to_pose"]
 
 
-class GoalHandle:
-    """Stands for rclpy's ServerGoalHandle: it executes a goal by calling the server's callback."""
-
-    def __init__(self, services, start, goal):
-        self.request = SimpleNamespace(
-            goal=stamped_pose(goal, "map"), start=PoseStamped(), use_start=start is not None
-        )
-        if start is not None:
-            self.request.start = stamped_pose(start, "map")
-        self.ends, self.result, self._services = [], None, services
-
-    def execute(self):
-        self.result = self._services.finish(self)
-
-    def succeed(self):
-        self.ends.append("succeeded")
-
-    def abort(self):
-        self.ends.append("aborted")
-
-
 def compute(server, start, goal):
-    """Hand a goal to the handlers of the action, as rclpy would."""
-    services = make_services(server)
+    """Hand a goal to the handlers of the action, as rclpy would; return handle and result."""
+    services, results = make_services(server), []
     services.make_result = lambda: SimpleNamespace(**COMPUTE_PATH_TO_POSE)
-    handle = GoalHandle(services, start, goal)
+    begin = PoseStamped() if start is None else stamped_pose(start, "map")
+    end, uses_start = stamped_pose(goal, "map"), start is not None
+    handle = Mock(request=SimpleNamespace(goal=end, start=begin, use_start=uses_start))
+    handle.execute.side_effect = lambda: results.append(services.finish(handle))
     services.compute(handle)
-    wait_until(lambda: handle.ends, "the end of the goal")
-    return handle
+    wait_until(lambda: results, "the end of the goal")
+    return handle, results[0]
+
+
+def code_of(server, start, goal):
+    """Return the error code of a goal that is aborted."""
+    handle, result = compute(server, start, goal)
+    assert handle.abort.called and not handle.succeed.called and result.path.poses == []
+    return result.error_code
 
 
 def test_a_path_to_a_pose_is_the_plan_of_can_traverse_and_a_goal_without_one_has_a_code(
     start_server, client, lasting
 ):
     server, start, goal = start_server(planner="fan"), (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)
-    assert compute(server, start, goal).result.error_code == 200  # no map
+    assert code_of(server, start, goal) == 200  # no map
     server.service.take_terrain(make_terrain(waves))
-    assert compute(server, None, goal).result.error_code == 200  # nobody knows where it is
-    assert compute(server, start, (99.0, 0.0, 0.0)).result.error_code == 204
-    assert compute(server, (99.0, 0.0, 0.0), goal).result.error_code == 203
+    assert code_of(server, None, goal) == 200  # nobody knows where it is
+    assert code_of(server, start, (99.0, 0.0, 0.0)) == 204
+    assert code_of(server, (99.0, 0.0, 0.0), goal) == 203
     plan = path_to_poses(client.can_traverse(start, goal), "map")
-    handle = compute(server, start, goal)
-    assert handle.ends == ["succeeded"] and handle.result.error_code == 0
-    np.testing.assert_array_equal(path_to_poses(handle.result.path, "map"), plan)
+    handle, result = compute(server, start, goal)
+    assert handle.succeed.called and result.error_code == 0
+    np.testing.assert_array_equal(path_to_poses(result.path, "map"), plan)
     client.send_odometry(start)
     wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
-    here = compute(server, None, goal)
-    np.testing.assert_allclose(path_to_poses(here.result.path, "map"), plan, atol=1e-9)
+    _, result = compute(server, None, goal)
+    np.testing.assert_allclose(path_to_poses(result.path, "map"), plan, atol=1e-9)
+    by_the_edge = 0.0, 3.95, 0.5 * np.pi  # on the map, but wheels are not
+    assert code_of(server, start, by_the_edge) == 208
     server.service.take_terrain(make_terrain(wall_at(0.5)))
-    handle = compute(server, start, (1.5, 0.0, 0.0))
-    assert handle.ends == ["aborted"] and handle.result.error_code == 208
-    assert handle.result.path.poses == []
+    assert code_of(server, start, (1.5, 0.0, 0.0)) == 208

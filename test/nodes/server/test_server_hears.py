@@ -12,7 +12,7 @@ from rover_physics import load_rover
 from rover_physics.names import WHEEL_JOINTS
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, begin_plan, verdict_of
-from support.ros_fixtures import call, hear
+from support.ros_fixtures import call, hear, run_in_executor
 from support.waiting import wait_until
 
 
@@ -37,6 +37,19 @@ def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(
     assert verdict["code"] == "cancelled"
     assert verdict["map_hash"] == first != server.service.known_map.fingerprint
     assert not call(service, Trigger.Request()).success
+
+
+def test_a_server_that_ends_refuses_an_open_question_at_once(start_server, client, ros, endless):
+    server = start_server(time_budget=600.0)
+    client.send_terrain(make_terrain(waves))
+    with endless():
+        _, future = begin_plan(ros)
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        began = time.monotonic()
+        run_in_executor(server, server.desk.close)
+        assert time.monotonic() - began < 1.5
+    wait_until(future.done, "the answer")
+    assert future.result().plan.poses == []
 
 
 def test_stamps_of_answers_differ_even_while_the_clock_is_paused(start_server, client):

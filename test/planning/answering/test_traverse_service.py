@@ -16,6 +16,7 @@ from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
 from support.grounds import make_terrain, raised, rocky, wall_at, waves
 from support.rough_grounds import with_std
+from support.rovers import LSR1
 from support.services import load_settings, make_service
 
 FAN = {"planner": "fan", "candidate_count": 1}
@@ -27,7 +28,9 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     uncertain = with_std(certain, 0.005)
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain, **FAN)
-    refused = service.snapshot().answer(start, goal).report.to_dict()
+    judged = service.snapshot().answer(start, goal)
+    assert judged.candidate.verdict.risk > 1.0  # that of the bounds
+    refused = judged.report.to_dict()
     assert not refused["traversable"]
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
@@ -90,6 +93,12 @@ def test_a_learned_friction_changes_new_questions_only_if_it_is_to_be_used(
     assert report["ground_since"] == ("" if learn == "off" else "12.5")
 
 
+@pytest.mark.parametrize(("is_bounded", "spread"), [(False, 0.1), (True, 0.05)])
+def test_a_friction_that_was_not_measured_is_as_uncertain_as_the_told_one(is_bounded, spread):
+    learned = LearnedGround(0.8, 0.04, 0.0, is_bounded).change(LSR1)
+    assert learned.uncertainty.friction == pytest.approx(spread)
+
+
 def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     flat = make_terrain(waves)
     shape = flat.elevation.shape
@@ -105,7 +114,10 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
 
     told = friction_used(make_service(flat))
     service = learned_on(1)
-    assert service.snapshot().known_map is service.snapshot().known_map  # packed once
+    laid = service.snapshot().known_map
+    assert service.snapshot().known_map is laid  # packed once
+    service.renew_map(None)
+    assert service.snapshot().terrain is laid.terrain
     assert asdict(Register().identify("", "", service.snapshot()))["ground_classes"] == {"1": 0.4}
     # On class 2 nothing slipped, and on class 3 no wheel was.
     for number, friction in {1: 0.4, 2: 0.8, 3: 0.8, np.nan: 0.5}.items():

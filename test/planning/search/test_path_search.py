@@ -279,6 +279,14 @@ def test_a_way_to_the_frontier_is_none_to_the_goal_once_that_is_known():
     np.testing.assert_allclose(answer.path.poses[-1], GOAL, atol=1e-9)
 
 
+def test_turns_on_the_spot_need_no_nodes_and_are_taken_where_they_cost_less_than_the_curve():
+    """Between rocks there was no way to a goal beside the start, or a way to a node and back."""
+    turn = ask(make_terrain(lambda x, y: 0.0 * x, half=2.0), (0.1, 0.07, 0.0), (0.1, 0.07, 1.2))
+    answer = find_path(turn, replace(LONG, ends_at_first=True))
+    assert answer.path.length == 0.0 and answer.cost < 1.0
+    np.testing.assert_allclose(answer.path.poses[[0, -1]], [turn.start, turn.goal], atol=1e-12)
+
+
 def test_a_lattice_coarser_than_obstacles_is_warned_of():
     coarse = find_path(ask(make_terrain(waves)), replace(LONG, cell=0.5))
     assert "cell of 0.5 m is larger than 0.40 m" in coarse.warning

@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import judge_path, load_rover
+from rover_physics import SweepOptions, judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.traction.balance import BalanceWriter
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.planning.angles import wrap
 from rover_planner.simulator import range_sensor
+from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -102,6 +104,17 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
     assert pull(plant, 1.0, needed) == pytest.approx(-1.0, abs=1e-3)
     high = pull(plant, 1.0, 1.3 * needed)
     assert high > -0.99 and pull(plant, 2.0, 0.5 * needed) < high
+
+
+def test_across_a_slope_no_wheel_slides_before_all_do():
+    slope, friction = 0.53, 0.6
+    asked = SweepOptions(friction=friction)
+    here = judge_path(LSR1, plane(0.0, slope, half=3.0), np.zeros((1, 3)), asked)[0]
+    forces = find_driving_forces(
+        BalanceWriter(LSR1), LSR1.wheel.radius, here, np.full(6, 0.02), direction=1.0
+    )
+    assert not forces.sliding.any()
+    assert forces.utilisation == pytest.approx(np.full(6, slope / friction), rel=0.05)
 
 
 @ENGINES
