@@ -106,22 +106,17 @@ def test_another_site_gets_no_channel(page):
 # What is told and drawn.
 
 
-def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(page):
-    sliders = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
-    for label in (FRICTION, "arm_yaw [rad]"):
-        page.hear({"ask": "value", "label": label, "value": 9999.0})
-        most = sliders[label][2]
-        wait_until(lambda at=label, most=most: told(page, "values")[at] == most, label)
-    wait_for_rest(page)
-
-
-def test_the_ends_of_a_slider_include_a_number_or_an_angle_that_was_set_elsewhere(page):
+def test_a_slider_goes_to_its_ends_which_include_a_number_or_an_angle_that_was_set_elsewhere(page):
     session, arm = page.session, LSR1.manipulator
 
     def ends(label: str) -> list[float]:
         rows = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
         return rows[label][1:3]
 
+    for label in (FRICTION, "arm_yaw [rad]"):
+        page.hear({"ask": "value", "label": label, "value": 9999.0})
+        most = ends(label)[1]
+        wait_until(lambda at=label, most=most: told(page, "values")[at] == most, label)
     most = 1.5 * ends(FRICTION)[1]
     slippery = replace(LSR1, friction=most)
     ask(page, lambda: session.take_change(replace(session.wanted, rover=slippery)))
