@@ -61,14 +61,9 @@ def told(page: Page, name: str):
     return page.channel.parts.get(name)
 
 
-def change_friction(page: Page, friction: float) -> None:
-    """Change the friction as a slider does."""
-    page.hear({"ask": "value", "label": FRICTION, "value": friction})
-
-
 def set_friction(page: Page, friction: float) -> None:
-    """Change the friction, and wait until that is judged and shown."""
-    change_friction(page, friction)
+    """Change the friction as a slider does, and wait until that is judged and shown."""
+    page.hear({"ask": "value", "label": FRICTION, "value": friction})
     wait_until(lambda: page.session.wanted.rover.friction == friction, "the value")
     wait_for_rest(page)
 
@@ -139,7 +134,7 @@ def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
 def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_be_cancelled(page):
     session, shown = page.session, page.session.shown
     with held(page.session):
-        change_friction(page, 0.75)
+        page.hear({"ask": "value", "label": FRICTION, "value": 0.75})
         wait_until(lambda: told(page, "verdict")["judging"], "the notice")
         assert told(page, "verdict")["old"].startswith("judging path")
         assert session.shown is shown
