@@ -65,11 +65,9 @@ def measure_on(name: str, *terrain: str) -> Iterator[Figure]:
 def open_view(*arguments: str, port: int = 0) -> Iterator[tuple[subprocess.Popen, str]]:
     """Run `rover_planner view` and yield its process and address."""
     command = [sys.executable, "-m", "rover_planner", "view", *arguments, "--port", str(port)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        line = next(line for line in process.stdout if line.startswith("open "))
-        yield process, line.split()[1]
-    finally:
-        process.kill()
-        process.wait()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            line = next(line for line in process.stdout or () if line.startswith("open "))
+            yield process, line.split()[1]
+        finally:
+            process.kill()

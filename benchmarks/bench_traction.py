@@ -9,10 +9,7 @@ time of its updates (estimate, build, solve, publish) and the number of missed c
 import time
 
 import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from benchmarks.bench_service import GOAL, START
@@ -24,6 +21,7 @@ from rover_physics.traction.contact_ekf import Motion
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.ros_fixtures import RosRun, hear
 from support.rough_grounds import rocky
 from support.traction_states import drive_states
 from support.waiting import wait_until
@@ -42,24 +40,6 @@ REPORTED = ("updates", "missed_cycles", "fallbacks", "update_time_median_ms", "u
 """Values of the diagnostics that are read."""
 
 
-class DiagnosticsReader:
-    """Keeps the values of the controller's last diagnostics."""
-
-    def __init__(self, node: Node):
-        self.values: dict[str, str] = {}
-        node.create_subscription(DiagnosticArray, "/diagnostics", self._take, topic_qos())
-
-    def _take(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            if status.name.startswith(CONTROLLER):
-                self.values = {item.key: item.value for item in status.values}
-
-    def wait_for_updates(self, count: float) -> dict[str, float]:
-        """Return the numeric values once `count` updates were made."""
-        wait_until(lambda: float(self.values.get("updates", 0)) >= count, "updates", 120.0)
-        return {key: float(self.values[key]) for key in REPORTED}
-
-
 def measure() -> list[Figure]:
     """Measure updates alone, then beside simulator and server."""
     return measure_alone() + measure_together()
@@ -69,10 +49,8 @@ def measure_alone() -> list[Figure]:
     """Measure a node that updates and publishes at RATE, on a drive over rocks."""
     prediction, motions, duration = drive_states(load_rover("lsr1"), rocky(1))
     assert prediction.settled.all(), "the rover must settle everywhere on the path"
-    context = Context()
-    rclpy.init(context=context, domain_id=DOMAIN)
-    enabled = [Parameter("enabled_at_start", value=True)]
-    node, times = TractionController(context=context, parameter_overrides=enabled), []
+    ros, enabled = RosRun(DOMAIN), [Parameter("enabled_at_start", value=True)]
+    node, times = TractionController(context=ros.context, parameter_overrides=enabled), []
     began = time.monotonic()
     for k in range(int(RATE * ALONE_TIME)):
         time.sleep(max(began + k / RATE - time.monotonic(), 0.0))
@@ -83,7 +61,7 @@ def measure_alone() -> list[Figure]:
         times.append(1e3 * (time.thread_time() - start))
         assert node.statistics.last.answer is not None, node.statistics.last.fault
     node.destroy_node()
-    rclpy.shutdown(context=context)
+    ros.close()
     name = "update alone (estimate, build, solve, publish), CPU time: "
     median, late = np.percentile(times, [50, 99])
     return [
@@ -111,22 +89,35 @@ def _take(node: TractionController, motion: Motion) -> None:
     node.service.take_command(SPEED, 0.0, now)
 
 
+def wait_for_updates(heard: list[DiagnosticArray], count: float) -> dict[str, float]:
+    """Return the REPORTED values of the controller once it has made `count` updates."""
+
+    def find_values() -> dict[str, str]:
+        statuses = (status for message in heard[::-1] for status in message.status)
+        last = next((one for one in statuses if one.name.startswith(CONTROLLER)), None)
+        found = {item.key: item.value for item in last.values} if last else {}
+        return found if float(found.get("updates", 0)) >= count else {}
+
+    values = wait_until(find_values, "updates", 120.0)
+    return {key: float(values[key]) for key in REPORTED}
+
+
 def measure_together() -> list[Figure]:
     """Measure the node while a simulator and a busy server run beside it."""
     ground = make_mars_terrain(1, 24.0, 0.05)
     with open_nodes() as nodes:
         client = nodes.client()
-        reader = DiagnosticsReader(client.node)
+        heard = hear(client.node, DiagnosticArray, "/diagnostics", topic_qos())
         nodes.start(SERVER, terrain_file=ground, candidate_count=1)
         client.first_plan(START, GOAL)
         nodes.start(CONTROLLER, rate=RATE, realtime_priority=PRIORITY, enabled_at_start=True)
         start = {"start_x": START[0], "start_y": START[1], "follow_commands": True}
         nodes.start("rover_simulator", rate=RATE, terrain_file=ground, **start)
-        before = reader.wait_for_updates(RATE)
+        before = wait_for_updates(heard, RATE)
         end = time.monotonic() + TOGETHER_TIME
         while time.monotonic() < end:
             client.plan(START, GOAL)
-        after = reader.wait_for_updates(before["updates"] + 0.9 * RATE * TOGETHER_TIME)
+        after = wait_for_updates(heard, before["updates"] + 0.9 * RATE * TOGETHER_TIME)
     updates = int(after["updates"] - before["updates"])
     together = "the same beside simulator and busy server, by the clock"
     rows = (

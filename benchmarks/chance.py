@@ -222,10 +222,8 @@ def reliability(name: str, part: Compared) -> tuple[str | float, ...]:
 
 def summary(name: str, found: Compared) -> tuple[str | float, ...]:
     """Return a row about a group of paths."""
-    accepted, sure = (
-        found.select(found.chance < ACCEPTED),
-        found.select(found.shares <= 1.0 - SURE),
-    )
+    accepted = found.select(found.chance < ACCEPTED)
+    sure = found.select(found.shares <= 1.0 - SURE)
     low, high = accepted.interval
     return (
         name,

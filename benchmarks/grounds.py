@@ -18,9 +18,7 @@ def all_grounds() -> dict[str, Terrain]:
     names = ("flat", "rocks", "fractal")
     grounds = {name: reference_ground(f"settled_a/{name}").terrain for name in names}
     grounds["Mars-like"] = make_mars_terrain(1)
-    for name, terrain in list(real_maps().items())[:1]:
-        grounds[name] = terrain
-    return grounds
+    return grounds | dict(list(real_maps().items())[:1])
 
 
 def real_maps() -> dict[str, Terrain]:

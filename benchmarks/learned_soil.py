@@ -72,12 +72,8 @@ def main(grounds: Annotated[int, typer.Option(help="Number of grounds.")] = 3) -
     for name, own in found.items():
         errors, scores, apart = np.array(own, float).T
         table.append((name, np.median(errors), np.mean(scores < 1.96), apart.mean()))
-    columns = {
-        "quantity": "",
-        "median error": ".0%",
-        "within 1.96 std": ".0%",
-        "told apart": ".0%",
-    }
+    headings = "median error", "within 1.96 std", "told apart"
+    columns = {"quantity": ""} | dict.fromkeys(headings, ".0%")
     print_table("Drives over soil, where another one was told", columns, table)
 
 

@@ -27,14 +27,13 @@ from benchmarks.drives import (
 )
 from benchmarks.measure import print_table
 from rover_physics import Rover, Terrain, load_rover
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.learning import drive_log as log
 from rover_planner.learning.friction_filter import FrictionEstimate
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
 from rover_planner.learning.wheel_odometry import GYRO_BIAS, GYRO_NOISE, WheelOdometry
 from rover_planner.simulator.mujoco_rover import MujocoRover
-from support.learning_drives import scatter, write_csv
+from support.learning_drives import row_of_plant, scatter, write_csv
 
 CONSTANT, SIDES, LINE = "constant", "per side", "at a line"
 LAYOUTS = (CONSTANT, CONSTANT, SIDES, LINE)
@@ -152,19 +151,14 @@ def record(drive: LearningDrive) -> Recorded:
     """Drive in MuJoCo."""
     obstacle, start = drive.obstacle, (START, 0.0, 0.0)
     plant = MujocoRover(obstacle.rover, drive.ground, start, drive.frictions[0], drive.timestep)
-    rows = [row_of(plant) for _ in follow_axis(plant, obstacle, drive.controller, most_time=1.5)]
+    rows = [measure(plant) for _ in follow_axis(plant, obstacle, drive.controller, most_time=1.5)]
     return Recorded(np.array(rows).reshape(-1, log.WIDTH), bool(plant.pose()[0] >= END))
 
 
-def row_of(plant: MujocoRover) -> np.ndarray:
-    """Return what is measured now."""
-    row = np.full(log.WIDTH, np.nan)
-    joints = plant.joint_positions
-    row[[log.TIME, log.X, log.Y, log.YAW]] = plant.time, *plant.pose()
-    row[[log.ROLL, log.PITCH]] = plant.attitude
-    row[log.SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
-    row[log.RATES], row[log.TORQUES] = plant.wheel_rates, plant.wheel_torques
-    row[log.STEERING] = plant.steering_angles
+def measure(plant: MujocoRover) -> np.ndarray:
+    """Return what is measured now, with the torques of the last step."""
+    row = row_of_plant(plant, plant.time)
+    row[log.TORQUES] = plant.wheel_torques
     return row
 
 

@@ -106,12 +106,8 @@ def try_pair(terrain: Terrain, pair: Pair) -> dict[str, Any]:
     answer, passes = search(terrain, pair), None
     if answer.path is not None:
         passes = judge_path(ROVER, terrain, answer.path.poses, OPTIONS.model)[1].traversable
-    return {
-        "outcome": answer.outcome,
-        "seconds_first": answer.seconds_first,
-        "seconds": answer.seconds,
-        "passes": passes,
-    }
+    told = ("outcome", "seconds_first", "seconds")
+    return {name: getattr(answer, name) for name in told} | {"passes": passes}
 
 
 def try_warm(terrain: Terrain, pair: Pair, seed: int) -> SearchResult:

@@ -18,7 +18,6 @@ from typing import Any
 import rclpy
 from nav_msgs.msg import Path as PathMessage
 from nav_msgs.srv import GetPlan
-from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -139,13 +138,13 @@ class Client:
         return self._plans[node].call_async(GetPlan.Request(**ends))
 
     def check(self, timeout: float = 60.0) -> dict[str, Any]:
-        """Return the verdict on the last path; raise LostAnswerError after a timeout [s]."""
+        """Return the verdict on the last path; raise TimeoutError after a timeout [s]."""
         return json.loads(finish(self.begin_check(), timeout).message)
 
     def plan(
         self, start: Pose, goal: Pose, timeout: float = START_TIME, node: str = SERVER
     ) -> PathMessage:
-        """Return a plan; raise LostAnswerError after a timeout [s]."""
+        """Return a plan; raise TimeoutError after a timeout [s]."""
         return finish(self.begin_plan(start, goal, node), timeout).plan
 
     def first_plan(self, start: Pose, goal: Pose, node: str = SERVER) -> PathMessage:
@@ -155,8 +154,8 @@ class Client:
 
     def set_parameter(self, name: str, value: object) -> bool:
         """Set a parameter of the server; return whether it was accepted."""
-        message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
-        request = SetParameters.Request(parameters=[message])
+        parameters = [Parameter(name, value=value).to_parameter_msg()]
+        request = SetParameters.Request(parameters=parameters)
         return finish(self._parameters.call_async(request), 10.0).results[0].successful
 
 

@@ -42,7 +42,7 @@ from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.checkout import TOP
 from support.project.launch_files import simulation_commands
-from support.ros_fixtures import LostAnswerError, RosRun, finish
+from support.ros_fixtures import RosRun, finish
 from support.waiting import wait_until
 
 FLIGHT = 0.1
@@ -139,14 +139,13 @@ class Programs:
         self._nodes, self.clock = nodes, SteppedClock(nodes.folder)
         self.running: dict[str, ChildProcess] = {}
         rests = self._write("simulated_traction_controller", rest_policy="brake")  # no torques
+        maps = self._write("traverse_server", map_folder=str(nodes.folder))
         commands = simulation_commands(
             terrain_file=str(terrain),
             speed="0.08",
             rover_simulator_parameters=self._write("rover_simulator"),
             traction_controller_parameters=rests,
-            traverse_server_parameters=self._write(
-                "traverse_server", map_folder=str(nodes.folder)
-            ),
+            traverse_server_parameters=maps,
         )
         self._modules = {name: words[2:] for name, words in commands.items()}  # behind python -m
         page = [PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
@@ -251,7 +250,7 @@ class Soak:
     def _change_map(self) -> None:
         """Load another map, and assume another friction: all that is watched is judged again."""
         request = LoadMap.Request(map_url=next(self._maps).name)
-        with contextlib.suppress(LostAnswerError):
+        with contextlib.suppress(TimeoutError):
             response = finish(self._load.call_async(request), PATIENCE)
             assert response.result == LoadMap.Response.RESULT_SUCCESS, response.result
             self._client.set_parameter("friction", float(self._rng.uniform(0.6, 0.8)))
@@ -279,7 +278,7 @@ class Soak:
         for _ in range(10):
             begin = time.monotonic()
             x, y, yaw = self.ear.pose.tolist()
-            with contextlib.suppress(LostAnswerError):
+            with contextlib.suppress(TimeoutError):
                 self._client.plan((x, y, yaw), (x + np.cos(yaw), y + np.sin(yaw), yaw), PATIENCE)
             taken.append(1e3 * (time.monotonic() - begin))
         return median(taken)

@@ -278,8 +278,8 @@ def print_bands() -> None:
     print_table("Bands of the loads of turned wheels at rest", columns, [row])
 
 
-def load_bands(balance, friction: float) -> list[tuple[float, float]]:
-    """Return the least and largest load of each wheel over the weight, tractions being equal.
+def load_bands(balance, friction: float) -> Iterator[tuple[float, float]]:
+    """Yield the least and largest load of each wheel over the weight, tractions being equal.
 
     Lateral forces are free as long as they balance and friction holds them.
     """
@@ -287,11 +287,10 @@ def load_bands(balance, friction: float) -> list[tuple[float, float]]:
     N, S = balance.normal, balance.lateral
     rows = [(side * S - friction * N) for side in (1.0, -1.0)] + [-N]
     A, b = np.concatenate(rows)[:, free], -np.concatenate(rows)[:, 0]
-    ends = [
-        [start + side * linprog(side * change, A, b, bounds=(None, None)).fun for side in (1, -1)]
-        for start, change in zip(N[:, 0], N[:, free], strict=True)
-    ]
-    return [(low, high) for low, high in ends]
+    for start, change in zip(N[:, 0], N[:, free], strict=True):
+        programs = (linprog(side * change, A, b, bounds=(None, None)) for side in (1, -1))
+        least, most = (one.fun for one in programs)
+        yield start + least, start - most
 
 
 def print_energy() -> None:

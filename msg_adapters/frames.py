@@ -62,17 +62,16 @@ def check_transform(message: Any) -> None:
     """Check a geometry_msgs/TransformStamped, also one of a bag.
 
     Raises:
-        MessageError: It is not finite, no unit quaternion, or a frame has no name.
+        MessageError: It is not finite, no unit quaternion, or not between two frames with names.
     """
     parent, child = message.header.frame_id, message.child_frame_id
     place, turn = message.transform.translation, message.transform.rotation
     numbers = np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w])
     length = float(np.linalg.norm(numbers[3:]))
-    if not (
-        np.isfinite(numbers).all() and abs(length - 1.0) <= NORM_TOLERANCE and parent and child
-    ):
+    is_unit = bool(np.isfinite(numbers).all()) and abs(length - 1.0) <= NORM_TOLERANCE
+    if not (is_unit and parent and child and parent != child):
         raise MessageError(
             f"transform from {child!r} to {parent!r} has translation {numbers[:3].tolist()} and "
             f"rotation {numbers[3:].tolist()}; it must be finite, a quaternion of length 1, and "
-            "both frames must have names"
+            "both frames must have names, which differ"
         )

@@ -4,7 +4,6 @@
 A GridMap is an object with the fields of grid_map_msgs/GridMap; tf2_msgs is not on PyPI either.
 """
 
-import copy
 from types import SimpleNamespace
 from typing import Any
 
@@ -93,8 +92,12 @@ def grid_map_of(
     centre: tuple[float, float] = (0.0, 0.0),
     basic: tuple[str, ...] = ("elevation",),
     order: str = "F",
+    start: tuple[int, int] = (0, 0),
 ) -> Any:
-    """Return a GridMap of layers (ny, nx), x, y ascending; grid_map itself stores by columns."""
+    """Return a GridMap of layers (ny, nx), x, y ascending; grid_map itself stores by columns.
+
+    Its circular buffer starts at a row and a column.
+    """
     ny, nx = next(iter(layers.values())).shape
     header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0), frame_id="map")
     position = SimpleNamespace(x=centre[0], y=centre[1], z=0.0)
@@ -105,38 +108,25 @@ def grid_map_of(
         length_y=ny * resolution,
         pose=SimpleNamespace(position=position, orientation=orientation),
     )
+    sizes = {"column_index": ny, "row_index": nx}
+    labels = list(sizes) if order == "F" else list(sizes)[::-1]
+    strides = nx * ny, sizes[labels[1]]
+    dim = [
+        SimpleNamespace(label=label, size=sizes[label], stride=stride)
+        for label, stride in zip(labels, strides, strict=True)
+    ]
     data = []
     for values in layers.values():
         stored = np.asarray(values, np.float32)[::-1, ::-1].T  # rows along -x, columns along -y
-        dims = ("column_index", ny), ("row_index", nx)
-        data.append(_array(stored.ravel(order), *(dims if order == "F" else dims[::-1])))
+        cells = np.roll(stored, start, (0, 1)).ravel(order)
+        layout = SimpleNamespace(dim=dim, data_offset=0)
+        data.append(SimpleNamespace(layout=layout, data=cells))
     return SimpleNamespace(
         header=header,
         info=info,
         layers=list(layers),
         basic_layers=[name for name in basic if name in layers],
         data=data,
-        outer_start_index=0,
-        inner_start_index=0,
+        outer_start_index=start[0],
+        inner_start_index=start[1],
     )
-
-
-def move_buffer(message: Any, row: int, column: int) -> Any:
-    """Return the map with a circular buffer that starts at another row and column."""
-    moved = copy.deepcopy(message)
-    for array in moved.data:
-        sizes = {dim.label: dim.size for dim in array.layout.dim}
-        order = "F" if array.layout.dim[0].label == "column_index" else "C"
-        cells = np.reshape(array.data, (sizes["row_index"], sizes["column_index"]), order)
-        array.data = np.roll(cells, (row, column), (0, 1)).ravel(order)
-    moved.outer_start_index, moved.inner_start_index = row, column
-    return moved
-
-
-def _array(values: np.ndarray, *dims: tuple[str, int]) -> Any:
-    sizes = [size for _, size in dims]
-    dim = [
-        SimpleNamespace(label=label, size=size, stride=int(np.prod(sizes[k:])))
-        for k, (label, size) in enumerate(dims)
-    ]
-    return SimpleNamespace(layout=SimpleNamespace(dim=dim, data_offset=0), data=values)

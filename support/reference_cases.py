@@ -4,7 +4,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -71,23 +71,20 @@ def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGrou
     )
 
 
-def reference_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
-    """Return the model's predictions for all cases with straight wheels under equal torques."""
-    return _predict(FILES)
-
-
-def steered_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
-    """Return the model's predictions for the cases with turned wheels under equal torques."""
-    return _predict(STEERED)
-
-
 @lru_cache
-def _predict(files: tuple[str, ...]) -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
+def reference_predictions(
+    files: tuple[str, ...] = FILES,
+) -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
+    """Return the model's predictions for all cases of files under equal torques."""
     rover = load_rover("lsr1")
     return tuple(
         (case, judge_poses(rover, case.terrain, case.poses, case.curvature)[0])
         for case in reference_grounds(files)
     )
+
+
+steered_predictions = partial(reference_predictions, STEERED)
+"""Returns the predictions for the cases with turned wheels."""
 
 
 def reference_ground(label: str) -> ReferenceGround:

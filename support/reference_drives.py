@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics import Rover, Terrain
+from support.paths import poses_at
 from support.rough_grounds import bouldered, fractal
 
 RESOLUTION = 0.02
@@ -61,8 +62,7 @@ def _caps(x: np.ndarray, y: np.ndarray, seed: int) -> np.ndarray:
 
 def drive_path(spacing: float = 0.01) -> np.ndarray:
     """Return the waypoints of every drive, `spacing` [m] apart."""
-    along = np.linspace(-1.2, 1.2, round(2.4 / spacing) + 1)
-    return np.column_stack([along, np.zeros((len(along), 2))])
+    return poses_at(np.linspace(-1.2, 1.2, round(2.4 / spacing) + 1))
 
 
 def unlimited(rover: Rover) -> Rover:

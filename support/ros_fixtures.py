@@ -108,20 +108,16 @@ def call(client, request, timeout: float = TIMEOUT, attempts: int = 2):
     # for only 0.1 s then, and its first response may be lost, so a request is sent again.
     for _ in range(attempts):
         future = client.call_async(request)
-        with contextlib.suppress(LostAnswerError):
+        with contextlib.suppress(TimeoutError):
             return finish(future, timeout)
         client.remove_pending_request(future)
     raise AssertionError(f"no answer from {client.srv_name}")
 
 
-class LostAnswerError(Exception):
-    """A client has waited in vain for an answer."""
-
-
 def finish(future: Any, timeout: float) -> Any:
-    """Wait for the response of a call; raise LostAnswerError after a timeout [s]."""
+    """Wait for the response of a call; raise TimeoutError after a timeout [s]."""
     done = threading.Event()
     future.add_done_callback(lambda _: done.set())
     if not done.wait(timeout):
-        raise LostAnswerError(f"no answer within {timeout} s")
+        raise TimeoutError(f"no answer within {timeout} s")
     return future.result()

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rover_physics import PathPrediction, Rover, Terrain
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 
 UP = np.array([0.0, 0.0, 1.0])
 GAP = 3e-5
@@ -152,26 +153,12 @@ def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.nd
 
 
 def balance_matrix(
-    rover: Rover, prediction: PathPrediction, i: int
+    rover: Rover, prediction: PathPrediction, i: int, shared: bool = True
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return A (9, 14), b (9,) and the wheels' positions along the body (6,) [m] of waypoint i.
+    """Return A (9, 12 + k), b (9,) and the lateral shares (6, k) of waypoint i.
 
-    A @ (N, T, s0, s1) = b is its balance, with forces in units of the weight and lateral forces
-    S = s0 + s1 * position.
-    """
-    A, b = free_balance_matrix(rover, prediction, i)
-    placed = place_rover(rover, prediction, i)
-    along = (placed.wheels - placed.origin) @ placed.attitude[:, 0]
-    shares = np.column_stack([np.ones(6), along])
-    return np.hstack([A[:, :12], A[:, 12:] @ shares]), b, along
-
-
-def free_balance_matrix(
-    rover: Rover, prediction: PathPrediction, i: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (9, 18) and b (9,) of waypoint i: A @ (N, T, S) = b is its balance.
-
-    All forces are in units of the weight; each wheel has an independent lateral force S.
+    A @ (N, T, s) = b is its balance, with forces in units of the weight and lateral forces
+    S = shares @ s, which are s0 + s1 * position along the body where `shared`, else independent.
     """
     placed, frames = place_rover(rover, prediction, i), contact_frames(rover, prediction, i)
     sums = []
@@ -181,7 +168,10 @@ def free_balance_matrix(
             forces[wheel] = rover.weight * frames[wheel, kind]
             acting = _on_wheels(prediction, i, placed, forces)
             sums.append(balance_sums(rover, placed, acting))
-    return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
+    A, b = np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
+    along = (placed.wheels - placed.origin) @ placed.attitude[:, 0]
+    shares = np.column_stack([np.ones(6), along]) if shared else np.eye(6)
+    return np.hstack([A[:, :12], A[:, 12:] @ shares]), b, shares
 
 
 COARSE_ANGLES, COARSE_ACROSS = 121, 17
@@ -193,14 +183,8 @@ STARTS, REFINEMENTS = 6, 7
 def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the smallest vertical gap (6,) [m] between each wheel's lower half and the ground.
 
-    The whole width of the wheels is looked at, densely and at all vertices of the ground, then
-    around the nearest points.
-
-    Args:
-        rover: The rover.
-        terrain: The ground.
-        prediction: The model's prediction.
-        i: Index of the waypoint.
+    The whole width of the wheels of waypoint i is looked at, densely and at all vertices of the
+    ground, then around the nearest points.
     """
     wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
     return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
@@ -258,29 +242,16 @@ def vertices_below(
 
 
 def turned_round(rover: Rover) -> Rover:
-    """Return the same rover with front and rear exchanged."""
-
-    def flip(point):
-        return (-point[0], point[1], point[2])
-
-    suspension, masses, belly = rover.suspension, rover.masses, rover.belly
-    parts = {name: getattr(masses, name) for name in ("body", "rocker", "bogie")}
-    flipped = {name: replace(part, com=flip(part.com)) for name, part in parts.items()}
-    other = {"rear": "front", "front": "rear", "middle": "middle"}
-    low, high = suspension.rocker_limits, suspension.bogie_limits
-    return replace(
-        rover,
-        name=f"{rover.name}_turned_round",
-        manipulator=None,
-        suspension=replace(
-            suspension,
-            rocker_pivot=flip(suspension.rocker_pivot),
-            bogie_pivot=flip(suspension.bogie_pivot),
-            rocker_wheel=other[suspension.rocker_wheel],
-            wheels={other[name]: flip(place) for name, place in suspension.wheels.items()},
-            rocker_limits=(-low[1], -low[0]),
-            bogie_limits=(-high[1], -high[0]),
-        ),
-        masses=replace(masses, **flipped),
-        belly=replace(belly, x=(-belly.x[1], -belly.x[0])),
-    )
+    """Return the same rover with front and rear exchanged, without an arm."""
+    name = f"{rover.name}_turned_round"
+    contents = rover_to_dict(replace(rover, name=name, manipulator=None))
+    suspension, belly = contents["suspension"], contents["belly"]
+    wheels = suspension["wheels"]
+    parts = [contents["masses"][name]["com"] for name in ("body", "rocker", "bogie")]
+    for place in (suspension["rocker_pivot"], suspension["bogie_pivot"], *wheels.values(), *parts):
+        place[0] = -place[0]
+    for ends in (suspension["rocker_limits"], suspension["bogie_limits"], belly["x"]):
+        ends[:] = -ends[1], -ends[0]
+    wheels["rear"], wheels["front"] = wheels["front"], wheels["rear"]
+    suspension["rocker_wheel"] = "front" if suspension["rocker_wheel"] == "rear" else "rear"
+    return rover_from_dict(contents, name)

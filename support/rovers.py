@@ -3,9 +3,12 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from rover_physics import load_rover
-from rover_physics.rover.model import Part, Rover, Steering
+from rover_physics.files.validation import Key, find_unit
+from rover_physics.rover.model import Rover, Steering
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FIXED = replace(LSR1, steering=None)
@@ -21,63 +24,22 @@ def similar(rover: Rover, size: float, mass: float = 0.0, gravity: float = 1.0) 
     torques, speeds and rates are such that it does the same in a time that is sqrt(size / gravity)
     times as long.
     """
-    wheel, suspension, masses, arm = rover.wheel, rover.suspension, rover.masses, rover.manipulator
-    belly, limits, uncertainty = rover.belly, rover.limits, rover.uncertainty
     mass = mass or size**3
     rate = math.sqrt(gravity / size)
+    factors = {
+        "m": size, "kg": mass, "m/s^2": gravity, "m/s": size * rate, "rad/s": rate,
+        "N m": mass * gravity * size,
+    }  # fmt: skip
 
-    def scale(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(size * value for value in values)
+    def scale(values: Any, key: tuple[Key, ...] = ()) -> Any:
+        if isinstance(values, dict):
+            return {name: scale(one, (*key, name)) for name, one in values.items()}
+        if isinstance(values, list):
+            return [scale(one, (*key, k)) for k, one in enumerate(values)]
+        is_number = isinstance(values, float)
+        return values * factors.get(find_unit(Rover, key), 1.0) if is_number else values
 
-    def enlarge(part: Part) -> Part:
-        return Part(mass * part.mass, scale(part.com))
-
-    return replace(
-        rover,
-        gravity=gravity * rover.gravity,
-        nominal_speed=size * rate * rover.nominal_speed,
-        wheel=replace(
-            wheel,
-            radius=size * wheel.radius,
-            width=size * wheel.width,
-            mass=mass * wheel.mass,
-            max_torque=mass * gravity * size * wheel.max_torque,
-            max_speed=rate * wheel.max_speed,
-        ),
-        suspension=replace(
-            suspension,
-            rocker_pivot=scale(suspension.rocker_pivot),
-            bogie_pivot=scale(suspension.bogie_pivot),
-            wheels={name: scale(place) for name, place in suspension.wheels.items()},
-        ),
-        masses=replace(
-            masses,
-            body=enlarge(masses.body),
-            rocker=enlarge(masses.rocker),
-            bogie=enlarge(masses.bogie),
-        ),
-        belly=replace(belly, z=size * belly.z, x=scale(belly.x), y=scale(belly.y)),
-        limits=replace(
-            limits,
-            belly_clearance=size * limits.belly_clearance,
-            wheel_drop=size * limits.wheel_drop,
-        ),
-        manipulator=arm
-        and replace(
-            arm,
-            base=scale(arm.base),
-            link_lengths=scale(arm.link_lengths),
-            link_masses=tuple(mass * one for one in arm.link_masses),
-            payload=mass * arm.payload,
-        ),
-        steering=rover.steering and replace(rover.steering, rate=rate * rover.steering.rate),
-        uncertainty=replace(
-            uncertainty,
-            mass=mass * uncertainty.mass,
-            com=size * uncertainty.com,
-            position=size * uncertainty.position,
-        ),
-    )
+    return rover_from_dict(scale(rover_to_dict(rover)), rover.name)
 
 
 SIMILAR = {

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rover that stands at the start of a path and hears the watch, and a rock across its path."""
+"""A rover that stands at the start of a path and hears stops, and a rock across its path."""
 
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from std_msgs.msg import Bool
@@ -23,27 +22,18 @@ def rock_ahead(x, y):
 
 
 class StandingRover(Node):
-    """Publishes odometry at START, and hears ~/stop and the state of the watch."""
+    """Publishes odometry at START, and hears ~/stop."""
 
     def __init__(self, ros: RosRun):
         super().__init__("rover", context=ros.context)
         self._odometry = self.create_publisher(Odometry, "odometry", 10)
         self.stops: list[tuple[bool, float]] = []
         """Each stop heard, and when [s]."""
-        self.statuses: list[DiagnosticStatus] = []
-        """States of the watch."""
         self.create_subscription(Bool, "/traverse_server/stop", self._hear, latched_qos())
-        self.create_subscription(DiagnosticArray, "diagnostics", self._note, 10)
-        self.create_timer(0.05, self._publish)
+        self.create_timer(0.05, lambda: self._odometry.publish(odometry_at(START)))
 
     def _hear(self, stop: Bool) -> None:
         self.stops.append((stop.data, time.monotonic()))
-
-    def _note(self, message: DiagnosticArray) -> None:
-        self.statuses += [one for one in message.status if one.name.endswith(": monitor")]
-
-    def _publish(self) -> None:
-        self._odometry.publish(odometry_at(START))
 
     @property
     def silence(self) -> float:

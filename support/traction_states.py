@@ -6,7 +6,7 @@ import numpy as np
 from rover_physics import PathPrediction, Rover, Terrain, judge_path
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
-from support.paths import poses_at
+from support.reference_drives import drive_path
 from support.rover_geometry import wheel_axes
 
 
@@ -24,7 +24,7 @@ def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
     )
 
 
-STRAIGHT = poses_at(np.linspace(-1.2, 1.2, 1201))
+STRAIGHT = drive_path(0.002)
 SPEED = 0.03
 """Speed of a drive [m/s]."""
 

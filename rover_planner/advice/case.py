@@ -23,10 +23,13 @@ from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.budget import QuestionStoppedError
+from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
-from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.path_query import Candidate, PathQueryOptions
+from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
@@ -54,6 +57,10 @@ class Case:
     """Standard deviations by which the map's heights may be wrong."""
     accepted_chance: float = ACCEPTED_CHANCE
     """Largest chance of failure of a path that passes."""
+    unobserved_check: UnobservedCheck | None = None
+    """Refuses ground under the belly that was never seen; None allows it."""
+    marked: MarkedPlaces = NONE_MARKED
+    """Places that are impassable."""
 
     @property
     def spacing(self) -> float:
@@ -79,7 +86,10 @@ class Case:
             stop_at_failure=True,
             accepted_chance=self.accepted_chance,
         )
-        return JudgedCase(self, *judged)
+        path = Candidate(self.poses, *judged)
+        if self.unobserved_check is not None:
+            path = self.unobserved_check.hold(path)
+        return JudgedCase(self, path.prediction, self.marked.hold(path).verdict)
 
     def predict(self) -> PathPrediction:
         """Predict all of the path, also beyond its first failure."""
@@ -108,10 +118,12 @@ class Case:
         return (0 if rows.start == 0 else 1) <= row <= place - rows.start
 
 
-def case_of(rover: Rover, terrain: Terrain, poses: Floats, options: PathQueryOptions) -> Case:
-    """Return the case of a path that was judged with some options."""
+def case_of(judge: PathJudge, poses: Floats) -> Case:
+    """Return the case of a path that was judged."""
+    options = judge.options
     chance = min(options.accepted_chance, ACCEPTED_CHANCE)
-    return Case(rover, terrain, poses, options.model, options.map_sigmas, chance)
+    about = options.model, options.map_sigmas, chance, judge.unobserved_check, judge.marked
+    return Case(judge.rover, judge.terrain, poses, *about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,9 +239,10 @@ class JudgedCase:
             map_sigmas=case.sigmas,
             accepted_chance=case.accepted_chance,
         )
-        ends = case.poses[0], case.poses[-1]
+        ends, held = (case.poses[0], case.poses[-1]), (case.unobserved_check, case.marked)
+        query = SearchQuery(case.rover, case.terrain, *ends, options, *held)
         try:
-            found = find_path(SearchQuery(case.rover, case.terrain, *ends, options), SEARCH)
+            found = find_path(query, SEARCH)
         except QuestionStoppedError:
             raise
         except PlanningError:

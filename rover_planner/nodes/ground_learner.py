@@ -43,7 +43,7 @@ from rover_planner.ros.qos import (
     newest_qos,
     polled_qos,
     result_qos,
-    sensor_qos,
+    topic_qos,
 )
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
@@ -88,7 +88,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._marks = self.create_publisher(String, MARK_PLACE, result_qos())
         self._wheels = WheelOdometry(self._rover)
         self._wheels_told = -math.inf  # time of the last odometry of the wheels that was sent
-        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
+        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", topic_qos())
         hear, rows = self.heard.subscribe, self._rows
         hear(TwistStamped, "cmd_vel", self._take_command, newest_qos())
         joints = joints_qos(POLLING)

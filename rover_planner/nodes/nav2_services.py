@@ -33,6 +33,7 @@ from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import describe_path
 
+NO_PATH = "NO_VALID_PATH"
 ERRORS = {
     "": "NONE",
     "off_map": "GOAL_OUTSIDE_MAP",
@@ -40,7 +41,7 @@ ERRORS = {
     **dict.fromkeys(("bad_request", "no_map", "stale_map", "internal_error"), "UNKNOWN"),
     **dict.fromkeys((CANCELLED, STOPPING), "UNKNOWN"),
 }
-"""Names of the errors of ComputePathToPose by the code of a verdict; others are NO_VALID_PATH.
+"""Names of the errors of ComputePathToPose by the code of a verdict; others are NO_PATH.
 Their numbers differ between releases of Nav2."""
 
 
@@ -81,7 +82,8 @@ class Nav2Services:
             ActionServer(
                 node,
                 action,
-                "~/compute_path_to_pose",
+                # ROS 2 Jazzy remaps services and topics, but not actions.
+                node.resolve_service_name("~/compute_path_to_pose"),
                 self.finish,
                 handle_accepted_callback=self.compute,
             )
@@ -147,9 +149,12 @@ def _name_error(judged: PathJudgement) -> str:
     """Return the name of the error of ComputePathToPose for a judgement."""
     if judged.traversable:
         return ERRORS[""]
-    name, chosen = ERRORS.get(judged.code, "NO_VALID_PATH"), judged.candidate
-    starts_there = chosen is not None and chosen.verdict.first_failure == 0
-    return "START_OUTSIDE_MAP" if name == "GOAL_OUTSIDE_MAP" and starts_there else name
+    name, chosen = ERRORS.get(judged.code, NO_PATH), judged.candidate
+    if name != "GOAL_OUTSIDE_MAP" or chosen is None or judged.judge is None:
+        return name
+    if chosen.verdict.first_failure == 0:
+        return "START_OUTSIDE_MAP"
+    return NO_PATH if judged.judge.terrain.contains(*chosen.poses[-1, :2]) else name
 
 
 def find_invalid_poses(codes: Sequence[str], given: NDArray[np.intp]) -> list[int]:

@@ -14,6 +14,7 @@ from typing import Any
 
 import rclpy
 import rclpy.logging
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 
@@ -64,7 +65,7 @@ def run_node(
         sys.setswitchinterval(switch_interval or sys.getswitchinterval())
         while not stop.wanted:
             executor.spin_once(timeout_sec=LOOK_FOR_STOP)
-    except RoverError as error:
+    except (RoverError, ParameterException) as error:  # ROS has parameters of its own
         logger.fatal(str(error))
         return EXIT_BAD_INPUT
     except (KeyboardInterrupt, ExternalShutdownException):

@@ -89,8 +89,8 @@ class ParameterSpec:
             isinstance(number, float) and math.isfinite(number) and low <= number <= high
             for number in values
         )
-        allowed = f" in {low:g} to {high:g} {self.unit}".rstrip() if self.bounds else ""
-        return "" if right else f"hold {len(self.default)} finite numbers{allowed}"
+        allowed = f", in {low:g} to {high:g} {self.unit}".rstrip() if self.bounds else ""
+        return "" if right else f"hold {len(self.default)} finite doubles such as 0.0{allowed}"
 
 
 def parameter(

@@ -47,12 +47,14 @@ class LearnedGround:
     def change(self, rover: Rover) -> Rover:
         """Return a rover with the friction to assume, and its uncertainty for chances.
 
-        With classes of ground it is the largest uncertainty of what is assumed on any of them.
+        What is not measured is as uncertain as the told friction. With classes of ground it is the
+        largest uncertainty of what is assumed on any of them.
         """
-        measured = [self, *(one for one in self.classes.values() if one.is_bounded)]
-        spread = max(one.std / one.mean for one in measured)
-        if self.classes:
-            spread = max(spread, rover.uncertainty.friction)
+        grounds = self, *self.classes.values()
+        spreads = [one.std / one.mean for one in grounds if one.is_bounded]
+        if self.classes or not spreads:
+            spreads.append(rover.uncertainty.friction)
+        spread = max(spreads)
         uncertainty = replace(rover.uncertainty, friction=min(spread, MOST_SPREAD))
         return replace(rover, friction=self.assume(rover.friction), uncertainty=uncertainty)
 

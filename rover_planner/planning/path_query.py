@@ -111,12 +111,15 @@ class Candidate:
         return path_length(self.poses)
 
     @property
-    def passable_share(self) -> float:
-        """Share of the path before the first failure, 0 to 1; 1 without a failure."""
+    def passable_length(self) -> float:
+        """Length of the path before its first failure [m]; all of it without one."""
         failure = self.verdict.first_failure
-        if failure < 0:
-            return 1.0
-        return failure / max(1, len(self.poses) - 1)
+        return self.length if failure < 0 else path_length(self.poses[: failure + 1])
+
+    @property
+    def passable_share(self) -> float:
+        """Share of the length before the first failure, 0 to 1."""
+        return self.passable_length / self.length if self.length > 0.0 else 0.0
 
     def refuse_at(self, waypoint: int, code: str, reason: str) -> "Candidate":
         """Return the path, refused at a waypoint for what the model does not know."""
@@ -167,10 +170,9 @@ class PathAnswer:
                 f"{passable} of {total} candidate paths traversable; chose {self.number}: "
                 f"{chosen.length:.2f} m, {energy:.1f} J, risk {risk:.2f}"
             )
-        driven = chosen.passable_share * chosen.length
         return (
             f"none of {total} candidate paths is traversable; number {self.number} gets furthest, "
-            f"{driven:.2f} m of {chosen.length:.2f} m: {chosen.verdict.reason}"
+            f"{chosen.passable_length:.2f} m of {chosen.length:.2f} m: {chosen.verdict.reason}"
         )
 
 

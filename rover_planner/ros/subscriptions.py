@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subscriptions that warn of publishers they cannot hear, with the parameter that mends it."""
 
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -52,10 +53,12 @@ def subscribe_to_map(
 
     The rest is as for `subscribe_to_requests`.
     """
-    values, group = node.values, None
+    values, spare = node.values, None
+    hear: Callable[..., object] = take
     for qos, mends in map_subscriptions(values.map_durability, values.input_reliability):
-        heard = _subscribe(node, kind, name, take, qos, mends, raw=True, group=group)
-        group = _Spare(heard)
+        heard = _subscribe(node, kind, name, hear, qos, mends, raw=True, group=spare)
+        spare = _Spare(heard, take)
+        hear = spare.hear
 
 
 class _Spare(MutuallyExclusiveCallbackGroup):
@@ -64,23 +67,32 @@ class _Spare(MutuallyExclusiveCallbackGroup):
     To read a large map takes Python's lock for long.
     """
 
-    def __init__(self, other: Subscription):
+    def __init__(self, other: Subscription, take: Callable[[bytes], object]):
         super().__init__()
-        self._other = other
+        self._other, self._take = other, take
+        self._idle_until = 0  # ns
 
     def can_execute(self, entity: Any) -> bool:
         """Return whether there is a publisher that only this subscription hears."""
         if isinstance(entity, Subscription):
             alone = entity.get_publisher_count() > self._other.get_publisher_count()
+            if not alone:
+                self._idle_until = time.time_ns()
             return alone and bool(super().can_execute(entity))
         return bool(super().can_execute(entity))
+
+    def hear(self, message: bytes, info: Mapping[str, int]) -> None:
+        """Take a message, unless it came while the other subscription heard all: it is old."""
+        idle_until, self._idle_until = self._idle_until, 0
+        if info["received_timestamp"] > idle_until:
+            self._take(message)
 
 
 def _subscribe(
     node: Node,
     kind: type,
     name: str,
-    take: Callable[[Any], object],
+    take: Callable[..., object],
     qos: QoSProfile,
     mends: Mapping[QoSPolicyKind, str],
     *,

@@ -11,16 +11,10 @@ from unittest import mock
 
 from support.project.checkout import TOP
 
-MODULES = {
-    "launch": ("LaunchContext", "LaunchDescription"),
-    "launch.actions": ("DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription",
-                       "OpaqueFunction"),
-    "launch.launch_description_sources": ("PythonLaunchDescriptionSource",),
-    "launch.substitutions": ("LaunchConfiguration",),
-    "launch_ros": (),
-    "launch_ros.actions": ("Node",),
-    "launch_ros.parameter_descriptions": ("ParameterValue",),
-}  # fmt: skip
+MODULES = (
+    "launch", "launch.actions", "launch.launch_description_sources", "launch.substitutions",
+    "launch_ros", "launch_ros.actions", "launch_ros.parameter_descriptions",
+)  # fmt: skip
 """What launch files import."""
 
 
@@ -37,12 +31,10 @@ class Kept(SimpleNamespace):
 
 @contextlib.contextmanager
 def launch_modules() -> Iterator[None]:
-    """Put stand-ins for launch and launch_ros where imports look first."""
-    made = {}
-    for name, classes in MODULES.items():
-        made[name] = ModuleType(name)
-        for one in classes:
-            setattr(made[name], one, type(one, (Kept,), {}))
+    """Put stand-ins for launch and launch_ros, with any class, where imports look first."""
+    made = {name: ModuleType(name) for name in MODULES}
+    for module in made.values():
+        module.__getattr__ = lambda name: type(name, (Kept,), {})  # type: ignore[method-assign]
     with mock.patch.dict(sys.modules, made):
         yield
 

@@ -88,17 +88,6 @@ class Visitor:
         self.box(label).fill(value)
         self.tab.keyboard.press("Tab")
 
-    def drag_slider(self, label: str, share: float) -> None:
-        """Drag the thumb of a slider to a share of its range."""
-        slider = self.tab.get_by_role("slider", name=label, exact=True)
-        slider.scroll_into_view_if_needed()
-        track = slider.bounding_box()
-        y = track["y"] + 0.5 * track["height"]
-        self.tab.mouse.move(track["x"] + 0.5 * track["width"], y)
-        self.tab.mouse.down()
-        self.tab.mouse.move(track["x"] + share * track["width"], y, steps=3)
-        self.tab.mouse.up()
-
     def choose(self, label: str, option: str) -> None:
         """Choose an option of a drop-down."""
         self.tab.get_by_label(label, exact=True).select_option(option)

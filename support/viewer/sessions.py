@@ -4,6 +4,7 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -80,24 +81,12 @@ def blocked_session() -> ViewSession:
     return session_on(blocked, goal=(2.0, 0.0, 0.0), search=search)
 
 
-def shift(terrain: Terrain, by: tuple[float, float]) -> Terrain:
-    """Return a ground at another place [m]."""
-    x, y = terrain.origin
-    return Terrain(terrain.elevation, terrain.resolution, (x + by[0], y + by[1]))
-
-
 def ask(page: Any, action: Callable[[], Any]) -> None:
     """Let the page's own thread act, and wait until it has told what that has changed."""
     for one in (action, lambda: None):  # it tells before it takes what comes next
         done = threading.Event()
-
-        def act(one: Callable[[], Any] = one, done: threading.Event = done) -> None:
-            try:
-                one()
-            finally:
-                done.set()
-
-        page.requests.put(act)
+        for request in (one, done.set):
+            page.requests.put(request)
         assert done.wait(PATIENCE), "the page's thread does nothing"
 
 
@@ -127,43 +116,30 @@ class Judge:
         self.take()
 
 
-def wait_patiently(condition: Callable[[], Any], what: str) -> Any:
-    """Return the first true value of what a busy machine's page does late."""
-    return wait_until(condition, what, PATIENCE)
-
-
-def is_busy(page: Any) -> bool:
-    """Return whether a page judges, paints or seeks advice."""
-    return any(work.progress for work in page.works)
+wait_patiently = partial(wait_until, timeout=PATIENCE)
+"""Returns the first true value of what a busy machine's page does late."""
 
 
 def is_at_rest(page: Any) -> bool:
-    """Return whether nothing is judged, and what was found is shown."""
-    if not is_busy(page):
+    """Return whether a page judges, paints and advises nothing, and shows what was found."""
+    if not any(work.progress for work in page.works):
         ask(page, lambda: None)
-    return not is_busy(page)
+    return not any(work.progress for work in page.works)
 
 
 def wait_for_rest(page: Any) -> None:
     """Wait until everything that is wanted is judged and shown."""
-    session = page.session
-    wait_until(
-        lambda: (session.is_complete or session.refusal) and is_at_rest(page),
-        "all judgements",
-        PATIENCE,
-    )
+    told = page.session
+    wait_patiently(lambda: (told.is_complete or told.refusal) and is_at_rest(page), "all of it")
 
 
 @contextmanager
 def held(session: ViewSession, at: str = "") -> Iterator[None]:
-    """Hold the judgement of a session where it reports that it begins with something.
+    """Hold the judgements that a session asks for in the context where they begin with something.
 
-    What is held can be cancelled, and gives way to newer steps, which are held, too. It goes on
-    at the end of the context. So a test can look at work that is under way as long as it takes.
-
-    Args:
-        session: The session, which asks for the judgement within the context.
-        at: What is held, such as "searching for a path"; empty: all.
+    This is `at`, such as "searching for a path"; empty: anything. What is held can be cancelled,
+    and gives way to newer steps, which are held, too. It goes on at the end of the context. So a
+    test can look at work that is under way as long as it takes.
     """
     find_steps, go_on = session.find_steps, threading.Event()
 

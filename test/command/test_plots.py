@@ -9,13 +9,14 @@ import pytest
 pytest.importorskip("matplotlib", reason="needs matplotlib")
 from matplotlib.figure import Figure
 
-from rover_physics import Terrain
 from rover_planner.figures.path_picture import _draw_uses, draw_path
 from rover_planner.figures.plots import draw_answers
 from rover_planner.planning.goals import Goal
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from support.grounds import make_terrain
+from support.paths import poses_at
 from support.rovers import LSR1
 
 COARSE = PathQueryOptions(count=3, spacing=0.4, waypoint_spacing=0.1)
@@ -23,9 +24,7 @@ COARSE = PathQueryOptions(count=3, spacing=0.4, waypoint_spacing=0.1)
 
 @pytest.fixture(scope="module")
 def holed():
-    elevation = np.zeros((81, 121))
-    elevation[60:, 80:] = np.nan
-    return Terrain(elevation, 0.1, (-6.0, -4.0))
+    return make_terrain(lambda x, y: np.where((x > 2.0) & (y > 2.0), np.nan, 0.0), 0.1, 6.0)
 
 
 def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, holed):
@@ -43,7 +42,7 @@ def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_p
 
 
 def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(tmp_path):
-    ground = Terrain(np.zeros((41, 41)), 0.1, (-2.0, -2.0))
+    ground = make_terrain(lambda x, y: 0.0 * x, half=2.0)
     question = SearchQuery(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), PathQueryOptions())
     answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))
     draw_path(tmp_path / "plan.svg", question, answer, "hill.npz")
@@ -53,12 +52,8 @@ def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_lim
 
 
 def test_the_use_along_a_plan_has_the_peaks_between_waypoints():
-    x = 0.05 * np.arange(121) - 3.0
-    bump = Terrain(
-        np.tile(np.where((x > 0.3) & (x < 0.5), 0.06, 0.0), (81, 1)), 0.05, (-3.0, -2.0)
-    )
-    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros((41, 2))])
-    path = check_path(LSR1, bump, poses)
+    bump = make_terrain(lambda x, y: 0.06 * ((x > 0.3) & (x < 0.5)))
+    path = check_path(LSR1, bump, poses_at(np.linspace(-1.0, 1.0, 41)))
     axes = Figure().subplots()
     _draw_uses(axes, LSR1, path)
     highest = max(np.nanmax(line.get_ydata()) for line in axes.lines[:-1])
@@ -69,8 +64,7 @@ def test_forces_that_no_verdict_asks_for_are_shaded(tmp_path, monkeypatch):
     """A wheel that rolls off an edge may use more friction than the verdict tells."""
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
-    x = 0.05 * np.arange(121) - 4.5
-    ledge = Terrain(np.tile(np.where(x < -2.5, 0.06, 0.0), (81, 1)), 0.05, (-4.5, -2.0))
+    ledge = make_terrain(lambda x, y: 0.06 * (x < -2.5), half=4.5)
     options = dataclasses.replace(COARSE, count=1, waypoint_spacing=0.02)
     for goal, is_beyond in (((-3.2, 0, 0), False), ((-1.5, 0, 0), True)):
         answer = answer_path_query(LSR1, ledge, (-3.5, 0, 0), goal, options)

@@ -18,9 +18,9 @@ ROVER = replace(load_rover("lsr1"), nominal_speed=SPEED)
 SLOPE = 0.3
 
 
-def learn(rows, terrain=None) -> GroundLearner:
+def learn(rows, terrain=None, rover=ROVER) -> GroundLearner:
     """Return a learner that has taken rows."""
-    learner = GroundLearner(ROVER, ramp(SLOPE) if terrain is None else terrain)
+    learner = GroundLearner(rover, ramp(SLOPE) if terrain is None else terrain)
     for row in rows:
         learner.take(row)
     return learner
@@ -131,10 +131,8 @@ def test_slip_over_a_short_way_is_seen_at_any_speed(speed):
     rover, way = replace(ROVER, nominal_speed=speed), 0.15
     rows = climb(rover, SLOPE, 1.2 / speed, speed)
     rows[(rows[:, X] > 0.0) & (rows[:, X] < way), RATES] *= 1.6
-    learner = GroundLearner(rover, ramp(SLOPE))
-    for row in rows:
-        learner.take(row)
-    assert learner.estimate.slip_time == pytest.approx(0.6 / speed, abs=way / speed)
+    estimate = learn(rows, rover=rover).estimate
+    assert estimate.slip_time == pytest.approx(0.6 / speed, abs=way / speed)
 
 
 def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
@@ -198,22 +196,16 @@ def test_slip_is_seen_without_any_torque_and_measures_nothing():
     assert estimate.friction.high is None and estimate.friction.low == 0.0
 
 
-def drive_up(friction: float, degrees: float, seconds: float) -> np.ndarray:
-    """Return rows of a drive up a slope in MuJoCo by speed servos, from just before it."""
-    simulator = pytest.importorskip("rover_planner.simulator.mujoco_rover")
-    ground, rows = drive_ground("slope", degrees), []
-    plant = simulator.MujocoRover(ROVER, ground, (-0.5, 0.0, 0.0), friction)
-    for time in np.arange(0.0, seconds, 0.02):
-        plant.drive(SPEED, 0.0, 0.02)
-        rows.append(row_of_plant(plant, time))
-    return np.array(rows)
-
-
 @pytest.mark.long
 def test_friction_and_sticking_are_learned_on_a_slope_that_is_too_steep():
-    friction = 0.4
-    rows = drive_up(friction, 24.0, 26.0)
-    estimate = learn(rows, drive_ground("slope", 24.0)).estimate
+    simulator = pytest.importorskip("rover_planner.simulator.mujoco_rover")
+    friction, ground, rows = 0.4, drive_ground("slope", 24.0), []
+    plant = simulator.MujocoRover(ROVER, ground, (-0.5, 0.0, 0.0), friction)
+    for time in np.arange(0.0, 26.0, 0.02):
+        plant.drive(SPEED, 0.0, 0.02)
+        rows.append(row_of_plant(plant, time))
+    rows = np.array(rows)
+    estimate = learn(rows, ground).estimate
     assert estimate.friction.mean == pytest.approx(friction, rel=0.1)
     assert estimate.friction.low < friction < estimate.friction.high
     # It is stuck from where its speed over the next second is below a tenth of the commanded.

@@ -4,11 +4,13 @@
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, judge_path
+from rover_physics import judge_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.maps.living_map import LivingMap
+from rover_planner.maps.map_keeper import MapKeeper
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from support.grounds import make_terrain, raised, rocky, waves
 from support.rough_grounds import with_std
 from support.rovers import LSR1, M2020
@@ -88,24 +90,17 @@ def test_filled_cells_say_so_and_seen_ones_stay():
     assert 6 <= contacts < 0.3 * is_filled.sum()
 
 
-def test_the_margin_continues_the_ground_around_the_wheels():
-    areas = [
-        np.isfinite(filled(SLOPE, margin, (-1.0, 0.0, 0.3)).snapshot().terrain.elevation).sum()
-        * 0.05**2
-        for margin in (0.0, 0.2)
-    ]
+def test_the_margin_continues_the_ground_around_the_wheels_where_the_rover_starts_alone():
+    keeper = MapKeeper(LSR1, TraverseServerParameters(footprint_margin=0.2))
+    start, further = (standing_at(LSR1, SLOPE, (x, 0.0, 0.3))[0] for x in (-2.2, -0.5))
+    first = keeper.take(blind_behind(SLOPE, 0.8), "elevation_cloud", 1.0, start)
+    then = keeper.fill(further, 2.0)
+    there, both = (
+        np.isin(one.sources.source, (CONTACT, FOOTPRINT)).sum() for one in (first, then)
+    )
     # The wheels' outline of lsr1 is 1.0 m x 0.7 m; interpolation needs 1.5 cells around it.
-    assert areas[1] - areas[0] == pytest.approx(1.55 * 1.25 - 1.15 * 0.85, rel=0.05)
-
-
-def test_a_map_that_begins_ahead_of_the_rover_grows_to_where_it_stands():
-    ahead = Terrain(np.zeros((40, 40)), 0.05, (0.6, -1.0))
-    standing, _ = standing_at(LSR1, make_terrain(lambda x, y: 0.0 * x), (0.0, 0.0, 0.0))
-    living = LivingMap()
-    living.replace(ahead, "elevation_cloud", 1.0)
-    assert fill(living, standing)
-    terrain = living.snapshot().terrain
-    assert terrain.contains(-0.5, 0.0) and terrain.elevation_at(0.0, 0.0) == pytest.approx(0.0)
+    assert there * 0.05**2 == pytest.approx(1.55 * 1.25, rel=0.05)
+    assert (both - there) * 0.05**2 == pytest.approx(1.15 * 0.85, rel=0.05)
 
 
 def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():

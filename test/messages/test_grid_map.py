@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from msg_adapters.errors import MessageError
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from rover_physics.terrain.grid import fingerprint
-from support.messages import grid_map_of, move_buffer, set_field
+from support.messages import grid_map_of, set_field
 from support.project.checkout import TOP
 
 RNG = np.random.default_rng(3)
@@ -23,6 +23,7 @@ HEIGHTS[2, 3] = HEIGHTS[0, 1] = np.nan
 
 def test_heights_ascend_along_x_and_y_from_the_cell_of_smallest_x_and_y():
     message = grid_map_of({"elevation": HEIGHTS}, 0.5, centre=(10.0, -4.0))
+    message.info.pose.orientation.w = 0.0  # all zeros: not set, and taken as unturned
     terrain = terrain_from_grid_map(message)
     np.testing.assert_array_equal(terrain.elevation, HEIGHTS)
     # 5 columns along x and 7 rows along y, around the centre
@@ -34,7 +35,7 @@ def test_heights_ascend_along_x_and_y_from_the_cell_of_smallest_x_and_y():
 def test_a_moved_buffer_start_gives_the_same_terrain_to_the_bit(row, column, order):
     layers = {"elevation": HEIGHTS, "variance": HEIGHTS**2, "friction": 0.5 + 0.0 * HEIGHTS}
     unmoved = grid_map_of(layers, 0.05, centre=(1.15, -0.35))
-    moved = move_buffer(grid_map_of(layers, 0.05, (1.15, -0.35), order=order), row, column)
+    moved = grid_map_of(layers, 0.05, (1.15, -0.35), order=order, start=(row, column))
     assert (row, column) == (0, 0) or list(moved.data[0].data) != list(unmoved.data[0].data)
     hashes = {fingerprint(terrain_from_grid_map(message)) for message in (moved, unmoved)}
     assert len(hashes) == 1
@@ -66,12 +67,6 @@ def test_a_cell_that_a_basic_layer_or_the_variance_lacks_is_unknown():
     expected = np.isnan(HEIGHTS)
     expected[4, 4] = expected[5, 0] = True
     np.testing.assert_array_equal(np.isnan(terrain.elevation), expected)
-
-
-def test_an_orientation_of_zeros_is_not_set_and_taken_as_unturned():
-    message = grid_map_of({"elevation": HEIGHTS})
-    message.info.pose.orientation.w = 0.0
-    np.testing.assert_array_equal(terrain_from_grid_map(message).elevation, HEIGHTS)
 
 
 TURN = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)

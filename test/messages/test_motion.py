@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import Imu
 
 from msg_adapters.commands import twist_to_speeds
@@ -16,7 +16,6 @@ from msg_adapters.frames import check_transform
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.planning.navigation.transforms import Rigid
 from support.messages import make_target, make_wrench, odometry_at, transform_message
 
@@ -50,28 +49,8 @@ def test_a_mounted_imu_gives_the_attitude_and_the_rates_of_the_body(mounting):
     assert attitude.rates == pytest.approx(rates)
 
 
-@pytest.mark.parametrize("frame", ["", "base_link"])
-def test_an_imu_of_the_body_and_one_without_a_frame_are_taken(frame):
-    measured = imu(xyzw_from_rpy(0.1, 0.2, 0.0), frame=frame)
-    assert imu_to_attitude(measured, ImuMounting("base_link")).roll == pytest.approx(0.1)
-
-
 def test_odometry_without_the_name_of_its_body_is_taken():
     assert odometry_to_pose(odometry(""), "map", "base_link")[1] == 0.0
-
-
-@pytest.mark.parametrize("kind", [Twist, TwistStamped])
-def test_both_kinds_of_twists_are_read(kind):
-    message = kind()
-    speeds = message.twist if kind is TwistStamped else message
-    speeds.linear.x, speeds.angular.z = 0.1, -0.2
-    assert twist_to_speeds(message) == (0.1, -0.2)
-
-
-def test_a_target_is_its_place_and_a_wrench_is_force_and_moment():
-    np.testing.assert_array_equal(target_to_point(make_target(), "map"), [1.0, 2.0, 0.3])
-    force, moment = wrench_to_force_and_moment(make_wrench(), "map")
-    assert (force.tolist(), moment.tolist()) == ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
 
 
 read_imu = partial(imu_to_attitude, mounting=ImuMounting("base_link"))
@@ -101,7 +80,8 @@ MAST = "in frame 'mast'.*imu_frame and imu_mounting"
         (read_odometry, odometry("mast"), "is of frame 'mast'; it must be of 'base_li"),
         (check_transform, transform(x=NAN), TRANSFORM),
         (check_transform, transform(length=2.0), TRANSFORM),
-        (check_transform, transform(child=""), TRANSFORM),
+        *[(check_transform, transform(child=child), TRANSFORM) for child in ("", "map")],
+        (twist_to_speeds, Twist(linear=Vector3(x=NAN)), "both must be finite"),
         (read_target, make_target(frame="odom"), "tool target is in frame 'odom'"),
         (read_target, make_target(frame=""), "without a frame_id"),
         *[(read_target, make_target(z=z), r"target is .* within 1e\+09") for z in (1e10, NAN)],

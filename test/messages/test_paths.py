@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 
 from msg_adapters.errors import MAX_TEXT, MessageError
-from msg_adapters.frames import check_frame
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import (
     MAX_POSES,
@@ -59,20 +58,6 @@ def test_a_bad_quaternion_is_refused(quaternion, text):
     x, y, z, w = quaternion
     with pytest.raises(MessageError, match=text):
         yaw_from_quaternion(Quaternion(x=x, y=y, z=z, w=w), "goal orientation")
-
-
-@pytest.mark.parametrize(
-    ("frame", "text"),
-    [
-        ("odom", "goal is in frame 'odom'; it must be in 'map'"),
-        ("", "goal is without a frame_id; it must be in 'map'"),
-        ("f" * 1_000_000, "goal is in frame 'fff"),
-    ],
-)
-def test_another_frame_is_refused_in_a_short_text(frame, text):
-    with pytest.raises(MessageError, match=text) as raised:
-        check_frame(frame, "map", "goal")
-    assert len(str(raised.value)) <= MAX_TEXT
 
 
 def spoilt(field, value):

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages read from their bytes have the fields that rclpy finds in them."""
 
+import itertools
 import math
 
 import pytest
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState, PointCloud2, PointField
@@ -16,30 +17,18 @@ from msg_adapters.raw_messages import SensorReader
 STAMP = Time(sec=7, nanosec=8)
 
 
-def imu() -> Imu:
-    """Return an IMU message whose numbers all differ."""
-    message = Imu()
-    turn, rate = message.orientation, message.angular_velocity
-    turn.x, turn.y, turn.z, turn.w, rate.x, rate.y, rate.z = 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, math.nan
-    message.orientation_covariance[:] = range(9)
-    message.angular_velocity_covariance[:] = -1.0
-    return message
+NUMBERS = itertools.count()
 
 
-def odometry(child: str) -> Odometry:
-    """Return an odometry of a frame whose numbers all differ."""
-    message = Odometry(child_frame_id=child)
-    place, turn = message.pose.pose.position, message.pose.pose.orientation
-    place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w = (float(k) for k in range(7))
-    message.pose.covariance[:] = range(36)
-    return message
-
-
-def twist() -> TwistStamped:
-    """Return a command whose numbers all differ."""
-    message = TwistStamped()
-    for part, first in ((message.twist.linear, 1.0), (message.twist.angular, 4.0)):
-        part.x, part.y, part.z = first, first + 1.0, first + 2.0
+def filled(message):
+    """Return a message whose floating-point numbers have been made to differ."""
+    for name, kind in message.get_fields_and_field_types().items():
+        if kind == "double":
+            setattr(message, name, float(next(NUMBERS)))
+        elif kind.startswith("double["):
+            getattr(message, name)[:] = [next(NUMBERS) for _ in getattr(message, name)]
+        elif "/" in kind:
+            filled(getattr(message, name))
     return message
 
 
@@ -72,10 +61,10 @@ def fields_of(message, like) -> object:
 @pytest.mark.parametrize(
     "message",
     [
-        imu(),
-        odometry(""),
-        odometry("base"),
-        twist(),
+        filled(Imu()),
+        filled(Odometry()),
+        filled(Odometry(child_frame_id="base")),
+        filled(TwistStamped()),
         cloud(),
         JointState(),
         JointState(name=["a"], position=[1.0]),
@@ -90,11 +79,6 @@ def test_fields_are_those_that_rclpy_reads(message, frame):
     assert (read.header.frame_id, read.header.stamp.nanosec) == (frame, 8)
 
 
-def test_a_command_without_header_has_the_same_fields():
-    plain = SensorReader().read(serialize_message(twist().twist), Twist)
-    assert plain == SensorReader().read(serialize_message(twist()), TwistStamped).twist
-
-
 @pytest.mark.parametrize(
     ("message", "lengths"),
     [(JointState(name=["wheel"], position=[1.0]), (0, 20, 40)), (cloud(), (0, 60, -9))],
@@ -104,11 +88,6 @@ def test_damaged_bytes_are_refused(message, lengths):
     for length in lengths:
         with pytest.raises(MessageError, match=f"no {kind.__name__}"):
             SensorReader().read(whole[:length], kind)
-
-
-def test_the_data_of_a_cloud_are_read_where_they_are():
-    message = serialize_message(cloud())
-    assert SensorReader().read(message, PointCloud2).data.obj is message
 
 
 def test_the_joints_of_several_publishers_keep_their_names():

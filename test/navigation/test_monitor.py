@@ -70,38 +70,26 @@ def test_a_path_that_comes_back_to_its_start_is_watched_from_the_start(service):
         assert found.state == WATCHING and found.place.remaining > 6.0
 
 
-@pytest.mark.parametrize("size", [1.0 / 16.0, 16.0])
-def test_the_place_of_a_rover_of_another_size_is_that_of_its_like(size):
-    turn = np.linspace(0.0, 4.0 * np.pi, 800)
-    loops = np.column_stack([np.sin(2.0 * turn), np.sin(turn), turn])
-    noise = np.random.default_rng(1).normal(0.0, 0.05, loops.shape)
-    units = [size, size, 1.0]
-    usual, like = WatchedPath(loops), WatchedPath(loops * units)
-    place = None
-    for pose in loops + noise:
-        last = None if place is None else place.index
-        place = usual.find_place(pose, last)
-        assert like.find_place(pose * units, last, size * USUAL_RADIUS).index == place.index
-
-
-def test_the_place_goes_on_where_a_path_backs_up():
+@pytest.mark.parametrize("size", [1.0 / 16.0, 1.0, 16.0])
+def test_the_place_goes_on_where_a_path_backs_up_whatever_the_size_of_the_rover(size):
     there = np.linspace(0.0, 0.6, 31)
-    x = np.concatenate([there, there[-2::-1]])
-    path = WatchedPath(np.column_stack([x, np.zeros((len(x), 2))]))
+    x, radius = np.concatenate([there, there[-2::-1]]), size * USUAL_RADIUS
+    path = WatchedPath(size * np.column_stack([x, np.zeros((len(x), 2))]))
     random, last, found = np.random.default_rng(3), 0, []
     for place in np.interp(np.arange(0.0, 60.0, 0.25), np.arange(len(x)), x):
-        last = path.find_place(
-            np.array([place, 0.05, 0.0]) + random.normal(0.0, 0.003, 3), last
-        ).index
+        noise = random.normal(0.0, 0.003, 3)
+        pose = (np.array([place, 0.05, 0.0]) + noise) * [size, size, 1.0]
+        last = path.find_place(pose, last, radius).index
         found.append(last)
     assert np.abs(np.array(found) - np.arange(0.0, 60.0, 0.25)).max() <= 2.0
-    assert path.is_end(path.find_place(np.array([0.0, 0.3, 0.0]), last).index)
+    assert path.is_end(path.find_place(np.array([0.0, 0.3 * size, 0.0]), last, radius).index)
 
 
 def test_a_wall_ahead_stops_and_one_behind_does_not(service, monitor):
     assert monitor.look(sight(service, STRAIGHT[50], 1.0)).place.index == 50
     found = monitor.look(sight(service, STRAIGHT[50], 2.0, wall_at(0.5)))
     assert found.state == STOPPED and found.judgement.reason[0].isdigit()
+    assert not found.judgement.candidate.is_complete  # it does not wait for what lies beyond
     assert monitor.look(sight(service, STRAIGHT[50], 3.0)).state == STOPPED  # the wall is gone
     assert monitor.take_path(WatchedPath(STRAIGHT), sight(service, STRAIGHT[120], 4.0))
     behind = sight(service, STRAIGHT[120], 5.0, lambda x, y: waves(x, y) + (x < -1.5))
@@ -130,22 +118,6 @@ def test_a_wall_that_is_certain_stops_before_the_errors_of_the_map_are_allowed_f
     assert (found.judgement.candidate.prediction.bounds is None) == is_exact
 
 
-def test_a_stop_does_not_wait_for_what_lies_beyond_its_reason(service, monitor):
-    found = monitor.look(sight(service, STRAIGHT[0], 1.0, wall_at(0.5)))
-    assert found.state == STOPPED and not found.judgement.candidate.is_complete
-    assert found.judgement.complete().candidate.is_complete
-
-
-def test_the_rest_is_judged_once_for_each_map(service, monitor):
-    one = sight(service, STRAIGHT[10], 10.0)
-    judged = [monitor.look(replace(one, time=10.0 + 0.1 * k)).judged for k in range(5)]
-    assert judged == [2] * 5
-    settings = service.settings
-    service.settings = replace(settings, query=settings.query.change(friction=0.6))
-    assert monitor.look(sight(service, STRAIGHT[10], 20.0)).judged == 3
-    service.settings = settings
-
-
 def test_on_learned_ground_the_rest_is_judged_once_too():
     learned = make_service(make_terrain(waves), learn="use")
     learned.take_ground(LearnedGround(0.7, 0.05, 0.6, True))
@@ -158,16 +130,10 @@ def test_on_learned_ground_the_rest_is_judged_once_too():
     assert found.state == STOPPED
 
 
-def test_a_place_that_is_marked_ahead_stops_and_one_behind_does_not(service, monitor):
+def test_a_place_that_is_marked_ahead_stops(service, monitor):
     marked = MarkedPlaces((MarkedPlace(-1.5, 0.0, 0.3, "stuck there", "today"),))
-    here = sight(service, STRAIGHT[100], 10.0)
-    behind = replace(here, snapshot=replace(here.snapshot, marked=marked))
-    assert monitor.look(behind).state == WATCHING
-    before = sight(service, STRAIGHT[0], 20.0)
-    monitor.take_path(WatchedPath(STRAIGHT), before)
-    assert monitor.look(before).state == WATCHING
-    ahead = replace(before, time=30.0, snapshot=replace(before.snapshot, marked=marked))
-    found = monitor.look(ahead)
+    here = sight(service, STRAIGHT[0], 10.0)
+    found = monitor.look(replace(here, snapshot=replace(here.snapshot, marked=marked)))
     assert (found.state, found.judgement.code) == (STOPPED, MARKED_CODE)
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState, PointCloud2
@@ -16,18 +15,19 @@ from std_msgs.msg import Bool, String
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.sensing import imu_message
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics import Rover as RoverModel
-from rover_physics import Terrain, load_rover
-from rover_physics.names import STEERING_JOINTS, WHEEL_JOINTS, WHEELS
+from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_physics.rover.steered_drive import SteeredDrive
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
 from rover_planner.nodes import ground_learner
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
-from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
 from support.learning_drives import climb, ramp
 from support.messages import row_messages
 from support.ros_fixtures import RosRun, hear
+from support.rovers import LSR1
 from support.waiting import wait_until
 
 SLOPE = 0.3
@@ -42,12 +42,11 @@ class Rover(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("rover", context=ros.context)
-        self._map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        kinds = {"joint_states": JointState, "odometry": Odometry, "cmd_vel": TwistStamped}
-        kinds["imu"] = Imu
-        self._senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
+        self.map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
+        self.senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
         self.estimates = hear(self, String, ground_learner.ESTIMATE, latched_qos())
-        self.wheels = hear(self, Odometry, "ground_learner/odometry", sensor_qos())
+        self.wheels = hear(self, Odometry, "ground_learner/odometry", topic_qos())
         self.marks = hear(self, String, ground_learner.MARK_PLACE, latched_qos())
         self.stops = hear(self, Bool, ground_learner.EMERGENCY_STOP, latched_qos())
 
@@ -58,48 +57,21 @@ class Rover(Node):
 
     def is_heard(self) -> bool:
         """Return whether all topics are connected."""
-        return all(s.get_subscription_count() for s in (*self._senders.values(), self._map))
-
-    def send_map(self, terrain: Terrain) -> None:
-        """Send the map."""
-        stamp = ns_to_stamp(int(BEGIN * 1e9))
-        self._map.publish(terrain_to_point_cloud(terrain, "map", stamp))
+        return all(s.get_subscription_count() for s in (*self.senders.values(), self.map))
 
     def send(self, row: np.ndarray, begin: float = BEGIN) -> None:
         """Send what a row holds; the joints first, which the row of the odometry has."""
         joints, odometry = row_messages(row, begin)
-        self.send_joints(joints)
+        self.senders["joint_states"].publish(joints)
         attitude = xyzw_from_rpy(*row[[ROLL, PITCH, YAW]])
         self.send_imu(attitude, np.zeros(3), odometry.header.stamp)
-        self._senders["odometry"].publish(odometry)
-
-    def send_joints(self, joints: JointState) -> None:
-        """Send joint states."""
-        self._senders["joint_states"].publish(joints)
+        self.senders["odometry"].publish(odometry)
 
     def send_imu(self, attitude, rates: np.ndarray, stamp, frame: str = "base_link") -> None:
         """Send attitude (quaternion) and angular velocity (3,) [rad/s] of an IMU."""
         imu = imu_message(attitude, rates, 3.7, 1e-3, stamp)
         imu.header.frame_id = frame
-        self._senders["imu"].publish(imu)
-
-
-def curve_to_the_left(
-    rover: RoverModel, speed: float, yaw_rate: float, steering_sign: float
-) -> JointState:
-    """Return the joints of a rover that rolls a curve at a speed [m/s] and yaw rate [rad/s]."""
-    joints = JointState()
-    for name, wheel_joint, steering_joint in zip(
-        WHEELS, WHEEL_JOINTS, STEERING_JOINTS, strict=True
-    ):
-        axle, side = name.split("_")
-        x, y, _ = rover.suspension.wheels[axle]
-        ahead, left = speed - yaw_rate * (y if side == "left" else -y), yaw_rate * x
-        rolls = np.hypot(ahead, left) / rover.wheel.radius
-        joints.name = [*joints.name, wheel_joint, steering_joint]
-        joints.position = [*joints.position, 0.0, steering_sign * np.arctan2(left, ahead)]
-        joints.velocity = [*joints.velocity, rolls, 0.0]
-    return joints
+        self.senders["imu"].publish(imu)
 
 
 def drive(node: ground_learner.GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
@@ -127,9 +99,10 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     ground = ramp(SLOPE)
-    rover.send_map(replace(ground, ground_class=np.full(ground.elevation.shape, 7.0)))
+    ground = replace(ground, ground_class=np.full(ground.elevation.shape, 7.0))
+    rover.map.publish(terrain_to_point_cloud(ground, "map", ns_to_stamp(int(BEGIN * 1e9))))
     wait_until(lambda: node.learner is not None, "the map")
-    rows = climb(load_rover("lsr1"), SLOPE, 12.0)[::5]
+    rows = climb(LSR1, SLOPE, 12.0)[::5]
     rows[60:, X] = rows[60, X] + 1e-4 * np.random.default_rng(1).standard_normal(60)
     drive(node, rover, rows[:60])
     wait_until(lambda: rover.estimates, "an estimate")
@@ -175,9 +148,12 @@ def test_steering_and_imu_are_read_as_the_parameters_say(ros):
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     speed, yaw_rate = 0.05, 0.06
-    joints = curve_to_the_left(load_rover("lsr1"), speed, yaw_rate, steering_sign=-1.0)
+    aims = SteeredDrive(LSR1).aim(speed, yaw_rate)
+    joints = JointState(name=[*WHEEL_JOINTS, *steering_joints(LSR1)])
+    joints.position = [*np.zeros(6), *-aims.angles[steered_wheels(LSR1)]]
+    joints.velocity = [*aims.speeds / LSR1.wheel.radius, *np.zeros(4)]
     for time_now in (BEGIN, BEGIN + 0.05):
-        rover.send_joints(joints)
+        rover.senders["joint_states"].publish(joints)
         stamp = ns_to_stamp(round(time_now * 1e9))
         rates = np.array([0.0, 0.0, -yaw_rate])
         rover.send_imu(xyzw_from_rpy(*upside_down), rates, stamp, "imu_link")

@@ -3,38 +3,19 @@
 
 import itertools
 import time
-from types import SimpleNamespace
 
-import pytest
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from msg_adapters.errors import MessageError
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import joints_qos, topic_qos
+from rover_planner.ros.qos import topic_qos
 from support.waiting import wait_until
 
 NAMES, WORDS = ("questions", "answers"), ["bad", "good", "better", "best"]
 
 
-@pytest.fixture
-def advertise(ros):
-    """Return a function that makes publishers of topics by name, which are heard."""
-    speaker = ros.spin(Node("speaker", context=ros.context))
-
-    def make(kind, *names):
-        publishers = [speaker.create_publisher(kind, name, topic_qos()) for name in names]
-        wait_until(lambda: all(p.get_subscription_count() for p in publishers), "the topics")
-        return publishers
-
-    return make
-
-
-def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_nothing(
-    ros, advertise
-):
+def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_nothing(ros):
     node = Node("hearer", context=ros.context)
     guard, heard = Guard(node.get_logger()), []
 
@@ -49,7 +30,12 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     due: list[bool] = []
     topics.subscribe(String, "news", take, topic_qos(), lambda: bool(due))
     ros.spin(node)
-    *publishers, news = advertise(String, *NAMES, "news")
+    speaker = ros.spin(Node("speaker", context=ros.context))
+    *publishers, news = (
+        speaker.create_publisher(String, name, topic_qos()) for name in (*NAMES, "news")
+    )
+    for publisher in (*publishers, news):
+        wait_until(publisher.get_subscription_count, "the subscription")
     topics.poll()
     before = time.monotonic()
     news.publish(String(data="later"))
@@ -66,51 +52,3 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     due.append(True)
     topics.poll()
     assert heard[-1][0] == "later"
-
-
-def test_what_cannot_be_used_is_logged_once_or_refused_by_who_asks(ros, advertise, monkeypatch):
-    node, lines, refused = Node("hearer", context=ros.context), [], []
-    monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=lines.append))
-    guard = Guard(SimpleNamespace(error=lines.append))
-
-    def take(message, _arrival):
-        if not message.position:
-            raise MessageError("no positions")
-
-    topics = PolledTopics(node, guard)
-    topics.subscribe(JointState, "joints", take, topic_qos())
-    topics.subscribe(
-        JointState, "others", take, topic_qos(), refuse=lambda name, error, _: refused.append(name)
-    )
-    joints, others = advertise(JointState, "joints", "others")
-    for publisher in (joints, joints, others):
-        publisher.publish(JointState())
-
-    def poll():
-        topics.poll()
-        return refused and lines
-
-    wait_until(poll, "both refusals")
-    assert refused == ["others"] and lines == ["joints not used: no positions"]
-    assert guard.total == 0
-
-
-def test_a_fast_publisher_of_joint_states_does_not_push_out_a_slow_one(ros, advertise):
-    """A rover's suspension at 50 Hz beside its wheels at 500 Hz."""
-    heard: list[str] = []
-    node = ros.spin(Node("hearer", context=ros.context))
-    topics = PolledTopics(node, Guard(node.get_logger()))
-    topics.subscribe(
-        JointState, "joints", lambda joints, _: heard.extend(joints.name), joints_qos(0.1)
-    )
-    slow, fast = advertise(JointState, "joints", "joints")
-    slow.publish(JointState(name=["rocker"]))
-    for _ in range(round(0.1 * 500.0)):
-        fast.publish(JointState(name=["wheel"]))
-    time.sleep(0.3)  # all have come
-
-    def poll():
-        topics.poll()
-        return {"rocker", "wheel"} <= set(heard)
-
-    wait_until(poll, "both")

@@ -7,10 +7,8 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
 
-from rover_physics import Terrain, save_terrain
 from rover_planner.ros.process import PROFILES, TRANSPORTS, take_priority
 from support.project.without_disk import fill_disk
 
@@ -35,14 +33,22 @@ def end(process, how, count=1):
     return rest
 
 
+PUBLISHING = ["start_x:=-46.0", "start_y:=-19.5", "rate:=500.0", "map_rate:=20.0"]
+
+
 @pytest.mark.long
-def test_a_server_says_which_map_it_has_and_ends_cleanly(start_process, tmp_path):
-    file = tmp_path / "flat.npz"
-    save_terrain(file, Terrain(np.zeros((101, 101)), 0.05, (-2.5, -2.5)))
-    process = start_process("traverse_server", f"terrain_file:={file}")
-    told = read_until(process, "ready for rover lsr1, map ")
-    assert "101 x 101 cells of 0.05 m, 100 % known" in told
-    end(process, signal.SIGINT, count=3)  # launch and the terminal both send one
+@pytest.mark.parametrize(
+    ("name", "parameters", "ready", "how"),
+    [
+        ("traverse_server", [], "lsr1, map spirit", signal.SIGINT),
+        ("rover_simulator", PUBLISHING, "ready", signal.SIGTERM),
+    ],
+)
+def test_a_node_that_is_told_so_ends_cleanly(start_process, name, parameters, ready, how):
+    process = start_process(name, "terrain_file:=spirit", *parameters)
+    read_until(process, ready)
+    time.sleep(0.3)
+    end(process, how, count=3)  # launch and the terminal both send one
 
 
 @pytest.mark.long
@@ -57,17 +63,6 @@ def test_a_signal_ends_a_node_while_kernels_compile(
     read_until(process, "compiling kernels 1 of ")
     time.sleep(0.5)
     assert "ready" not in end(process, how)
-
-
-@pytest.mark.long
-def test_a_simulator_that_is_told_to_end_while_it_publishes_ends_cleanly(start_process):
-    process = start_process(
-        "rover_simulator", "terrain_file:=spirit", "start_x:=-46.0", "start_y:=-19.5",
-        "rate:=500.0", "map_rate:=20.0",
-    )  # fmt: skip
-    read_until(process, "ready")
-    time.sleep(0.3)
-    end(process, signal.SIGTERM, count=3)
 
 
 def test_a_thread_that_ends_while_threads_take_priority_is_no_refusal(tmp_path, monkeypatch):

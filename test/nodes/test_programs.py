@@ -20,6 +20,7 @@ from support.project.checkout import TOP, setup_arguments
 from support.ros_fixtures import domain_id
 from support.waiting import wait_until
 
+START, MUJOCO = "--start=0,0,0", ("--ros-args", "-p", "engine:=mujoco", "-p")
 MODULES = {name: importlib.import_module(f"rover_planner.nodes.{name}") for name in PROGRAMS}
 PARAMETER_FILES = TOP / "config" / "parameters"
 OF_ROS = re.compile(r"/(parameter_events|rosout|.*/(\w+_parameters?\w*|get_type_description))$")
@@ -118,9 +119,17 @@ def test_what_a_plain_installation_brings_is_known_by_its_modules():
         ("traverse_server", ["--colour", "red"], "--colour"),
         ("rover_simulator", ["terrain_file:=mars.npz"], "--ros-args -p"),
         ("rover_simulator", ["--engine", "horses"], "'horses'; it must be one of quasi_static"),
+        ("rover_simulator", ["--ros-args", "-p", "soil:=dry_snad"], "no soil 'dry_snad'"),
+        ("rover_simulator", [*MUJOCO, "soil:=dry_sand"], "soil is "),
+        ("rover_simulator", [*MUJOCO, "policy:=optimal"], "policy is "),
         ("traverse_server", ["--ros-args", "-p", "terrain_file:=/no/file.npz"], "/no/file.npz"),
         ("traction_controller", ["--ros-args", "-p", "friction"], "-p friction"),
+        ("traction_controller", ["--ros-args", "-p", "use_sim_time:=1"], "expecting type 'BOOL'"),
         ("mission_planner", ["--ros-args", "--colour"], "--colour"),
+        ("mission_planner", ["--start=0,0,0"], "--goal"),
+        ("mission_planner", [START[:-2], "--goal=1,0,0"], "'0,0' is no pose; it must be X,Y,YAW"),
+        ("mission_planner", [START, "--goal=1,0,0", "--map=opportunity"], "presets are spirit"),
+        ("mission_planner", [START, "--goal=1,0,0", "--timeout=nan"], "nan; it must be a time"),
     ],
 )
 def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd, monkeypatch):

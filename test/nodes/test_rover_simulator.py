@@ -14,20 +14,14 @@ from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import imu_to_attitude
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics import save_terrain
-from rover_physics.errors import SoilError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steering_joints import steering_joints
-from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
-from rover_planner.nodes.traverse_server import TraverseServer
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
-from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.grounds import make_terrain, waves
 from support.ros_fixtures import PATIENT, hear, run_in_executor
-from support.rovers import LSR1
 from support.waiting import wait_until
 
 START_X = -1.0
@@ -123,78 +117,25 @@ def test_with_simulated_time_it_is_the_source_of_the_clock_and_late_steps_do_not
     wait_until(lambda: simulator.get_clock().now().nanoseconds >= stamps[-1], "its own clock")
 
 
-def test_bad_parameters_are_refused_by_name(start_simulator):
-    for given, text in (
-        ({"soil": "dry_snad"}, "no soil 'dry_snad'.*dry_sand"),
-        ({"engine": "mujoco", "soil": "dry_sand"}, "soil is .* engine mujoco"),
-        ({"engine": "mujoco", "policy": "optimal"}, "policy is .* engine mujoco"),
-    ):
-        with pytest.raises((PlanningError, SoilError), match=text):
-            start_simulator(**given)
-
-
-def drive_together(planner, nodes, goal, settings) -> float:
-    """Drive to a goal by simulator, server and controller; return how far off the rover is [m]."""
-    simulator, server, controller = nodes
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
+def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
+    ros, start_simulator, start_server, planner, engine
+):
+    simulator = start_simulator(follow_commands=True, engine=engine, sensor_range=2.0)
+    server, controller = start_server(planner="fan", map_updates="merge"), start_controller(ros)
     planner.wait_for_server()
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    plant = simulator.simulation.plant
+    first = wait_until(lambda: server.service.terrain, "the map")
+    plant, goal = simulator.simulation.plant, [START_X + 0.25, 0.01, 0.0]
     answer = planner.ask(plant.pose(), goal)
     assert answer["traversable"], answer["reason"]
-    Drive(planner, goal, settings, lambda told: None).run(answer["poses"])
-    assert controller.statistics.updates > 20
-    return np.hypot(*(plant.pose() - goal)[:2])
-
-
-@pytest.mark.slow
-def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
-    ros, start_simulator, start_server, planner
-):
-    simulator, controller = start_simulator(follow_commands=True), start_controller(ros)
-    nodes = simulator, start_server(planner="fan"), controller
     settings = DriveSettings(position_tolerance=0.1, timeout=200.0)
-    assert drive_together(planner, nodes, [START_X + 0.25, 0.01, 0.0], settings) < 0.1
-    assert controller.statistics.fallbacks == 0
-    assert all(ros.is_alive(node) for node in nodes)
-
-
-@pytest.mark.long  # two to three minutes each
-@pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
-def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(
-    ros, start_simulator, planner, tmp_path, engine
-):
-    terrain = make_mars_terrain(4, 8.0, rock_cover=0.25, crater_density=0.0)
-    start, goal = (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02)
-    save_terrain(tmp_path / "ground.npz", terrain)
-    options = PathQueryOptions().change(policy="optimal")
-    assert not answer_path_query(LSR1, terrain, start, goal, options).traversable
-    server = ros.start(
-        TraverseServer,
-        policy="optimal",
-        map_updates="merge",
-        search_frontier=True,
-        search_budget=8.0,
-        time_budget=60.0,
-    )
-    controller = ros.start(TractionController, enabled_at_start=True)
-    simulator = start_simulator(
-        terrain_file=str(tmp_path / "ground.npz"),
-        start_x=start[0],
-        start_y=start[1],
-        start_yaw=start[2],
-        engine=engine,
-        sensor_range=4.0,
-        sensor_occlusion=False,
-        map_rate=1.0,
-        follow_commands=True,
-        speed=0.1,
-    )
-    first = wait_until(lambda: server.service.terrain, "the map")
-    nodes, settings = (simulator, server, controller), DriveSettings(timeout=400.0, patience=5.0)
-    assert drive_together(planner, nodes, goal, settings) < 0.25
+    Drive(planner, goal, settings, lambda told: None).run(answer["poses"])
+    assert np.hypot(*(plant.pose() - goal)[:2]) < 0.1
+    assert controller.statistics.updates > 20 and controller.statistics.fallbacks == 0
     last = server.service.terrain
     assert np.isfinite(last.elevation).sum() > np.isfinite(first.elevation).sum()
-    assert all(ros.is_alive(node) for node in nodes)
+    assert all(ros.is_alive(node) for node in (simulator, server, controller))
 
 
 def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(

@@ -17,7 +17,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.server_inputs import LOOK_PERIOD, ServerInputs
 from support.grounds import make_terrain, waves
-from support.messages import grid_map_of, move_buffer, odometry_at, transform_message
+from support.messages import grid_map_of, odometry_at, transform_message
 
 PRIOR = make_terrain(waves)
 
@@ -51,11 +51,11 @@ def test_layers_of_a_grid_map_of_a_sensor_are_used_and_placed_by_its_mount_and_o
     )  # fmt: skip
     ones = np.ones(PRIOR.elevation.shape)
     layers = {"height": PRIOR.elevation, "variance": 4.0 * ones, "mu": 0.3 * ones}
-    message = grid_map_of(layers, PRIOR.resolution, basic=("height",))
+    message = grid_map_of(layers, PRIOR.resolution, basic=("height",), start=(5, 3))
     message.header.frame_id = "scanner"
     inputs.take_odometry(odometry_at((2.0, -1.0, 0.0)))
     source = inputs.frames.find_source("scanner", None, "elevation_map")
-    assert inputs.take_map(move_buffer(message, 5, 3), source, "elevation_map")
+    assert inputs.take_map(message, source, "elevation_map")
     found = inputs.service.terrain
     assert found.origin == pytest.approx(np.add(PRIOR.origin, (2.0, -1.0)))
     np.testing.assert_allclose(found.elevation, PRIOR.elevation + 0.5, atol=1e-6)

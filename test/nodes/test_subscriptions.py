@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps are heard whenever and however they are published, or who cannot be heard is named."""
 
+import time
 from functools import partial
 
 import pytest
@@ -38,12 +39,6 @@ def advertise(ros):
     return lambda qos: speaker.create_publisher(PointCloud2, "maps", qos)
 
 
-def test_a_map_from_before_the_start_is_heard(advertise, hear):
-    advertise(map_qos()).publish(PointCloud2())
-    heard = hear()
-    wait_until(lambda: heard, "the map")
-
-
 @pytest.mark.parametrize(
     ("values", "qos"),
     [
@@ -56,6 +51,19 @@ def test_volatile_maps_and_where_the_parameter_says_so_best_effort_ones_are_hear
 ):
     heard, publisher = hear(**values), advertise(qos)
     repeat_until(lambda: publisher.publish(PointCloud2()), lambda: heard, "the map")
+
+
+def test_a_map_is_not_heard_again_when_a_silent_publisher_comes(advertise, hear):
+    publisher = advertise(map_qos())
+    publisher.publish(PointCloud2(width=1))  # before who hears it has started
+    heard = hear()
+    wait_until(lambda: heard, "the map")
+    wait_until(lambda: publisher.get_subscription_count() == 2, "both subscriptions")
+    silent = advertise(map_qos(DurabilityPolicy.VOLATILE))
+    wait_until(lambda: silent.get_subscription_count() == 1, "the volatile subscription")
+    time.sleep(0.5)
+    assert len(heard) == 1
+    repeat_until(lambda: silent.publish(PointCloud2()), lambda: len(heard) > 1, "the other map")
 
 
 def test_a_best_effort_publisher_is_named_with_the_parameter_that_mends_it(advertise, hear, capfd):

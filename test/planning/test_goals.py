@@ -9,50 +9,30 @@ import pytest
 from rover_physics import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.goals import choose_mission, footprint_radius
-from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.grounds import raised
 from support.rovers import LSR1
-
-
-@pytest.fixture(scope="module")
-def holed():
-    """A Mars-like terrain with a corner that was never seen."""
-    return raised(make_mars_terrain(2, 16.0, 0.1), np.s_[90:, 90:], np.nan)
 
 
 def by_intent(mission):
     return {goal.intent: goal.pose for goal in mission.goals}
 
 
-def test_start_and_plain_goals_stand_on_known_ground(holed):
-    mission = choose_mission(holed, LSR1)
-    plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
-    assert len(plain) >= 2
-    for x, y, _ in [mission.start, *plain]:
-        turn = np.linspace(0, 2 * np.pi, 20)
-        radius = 0.5 * footprint_radius(LSR1)
-        assert np.isfinite(
-            holed.elevation_at(x + radius * np.cos(turn), y + radius * np.sin(turn))
-        ).all()
-
-
-def test_hard_goals_are_what_they_say(holed):
-    places = by_intent(choose_mission(holed, LSR1))
-    assert not holed.contains(*places["off the map"][:2])
-    x, y, _ = places["unknown ground"]
-    assert holed.contains(x, y)
-    assert np.isnan(holed.elevation_at(x, y))
-    assert np.isfinite(holed.elevation_at(*places["steep"][:2]))
-
-
-def test_no_plain_goal_is_beside_the_start_and_all_ground_to_the_rough_one_is_known():
-    spirit = load_terrain("spirit").fill_gaps(0.2)
+def test_goals_are_what_they_say_and_plain_ones_and_the_start_stand_apart_on_known_ground():
+    spirit, turn = load_terrain("spirit").fill_gaps(0.2), np.linspace(0.0, 2.0 * np.pi, 20)
+    around = 0.5 * footprint_radius(LSR1)
     for seed in (1, 2):
         mission = choose_mission(spirit, LSR1, seed)
-        line = np.linspace(mission.start[:2], by_intent(mission)["rough"][:2], 200)
+        places = by_intent(mission)
+        assert not spirit.contains(*places["off the map"][:2])
+        unknown = places["unknown ground"][:2]
+        assert spirit.contains(*unknown) and np.isnan(spirit.elevation_at(*unknown))
+        assert np.isfinite(spirit.elevation_at(*places["steep"][:2]))
+        line = np.linspace(mission.start[:2], places["rough"][:2], 200)
         assert np.isfinite(spirit.elevation_at(line[:, 0], line[:, 1])).all()
         plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
         assert len(plain) >= 2
+        for x, y, _ in (mission.start, *plain):
+            beneath = spirit.elevation_at(x + around * np.cos(turn), y + around * np.sin(turn))
+            assert np.isfinite(beneath).all()
         away = [math.hypot(x - mission.start[0], y - mission.start[1]) for x, y, _ in plain]
         assert min(away) > 2.0 * footprint_radius(LSR1)
 

@@ -92,22 +92,22 @@ def test_output_into_a_closed_pipe_or_a_full_disk_leaves_no_traceback(script):
     assert ended.stderr == f"{name}: the system refused: [Errno 28] No space left on device\n"
 
 
-def test_ctrl_c_ends_the_page_though_a_library_forgets_it_while_it_is_imported(tmp_path):
-    forget = "except BaseException:\n    pass\n"
-    press = "import os\ntry:\n    os.kill(os.getpid(), 2)\n    len(str(os))\n"
-    (tmp_path / "viser.py").write_text(press + forget)
-    script = "import sys; from rover_planner.cli import main; sys.exit(main(['view']))"
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(TOP)])}
-    ended = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, env=environment, timeout=60
-    )
-    assert (ended.returncode, ended.stderr) == (EXIT_INTERRUPTED, "")
+PRESS = "import os\nos.kill(os.getpid(), 2)\n"
+FORGET = (
+    "import os\ntry:\n    os.kill(os.getpid(), 2)\n    len(str(os))\n"
+    "except BaseException:\n    pass\n"
+)
 
 
-def test_ctrl_c_while_the_command_is_imported_leaves_no_trace(tmp_path):
-    (tmp_path / "typer.py").write_text("import os\nos.kill(os.getpid(), 2)\n")
+@pytest.mark.parametrize(
+    ("library", "words", "content"), [("typer", [], PRESS), ("viser", ["view"], FORGET)]
+)
+def test_ctrl_c_ends_a_program_while_a_library_is_imported_that_may_forget_it(
+    library, words, content, tmp_path
+):
+    (tmp_path / f"{library}.py").write_text(content)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(TOP)])}
-    command = [sys.executable, "-m", "rover_planner"]
+    command = [sys.executable, "-m", "rover_planner", *words]
     ended = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
     assert (ended.returncode, ended.stderr) == (EXIT_INTERRUPTED, "")
 

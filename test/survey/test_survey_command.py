@@ -5,7 +5,6 @@ import json
 import resource
 import signal
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.shell.run_program import end_as_by_ctrl_c
 from rover_planner.survey import dask_cluster
-from rover_planner.survey.chunk_survey import survey_chunk
+from rover_planner.survey.chunk_survey import ChunkReport, survey_chunk
 from rover_planner.survey.cog import write_layers
 from rover_planner.survey.dask_cluster import ClusterSettings, check_workers, open_client
 from rover_planner.survey.layout import Index
@@ -34,12 +33,10 @@ from support.survey_maps import (
     assert_same_bits,
     compute_here,
     fail_on_one,
-    forget_package,
     layers_of,
     make_request,
     make_rough_map,
     prepare_here,
-    refuse_one,
     survey_here,
 )
 from support.waiting import wait_until
@@ -109,11 +106,10 @@ def test_a_chunk_that_fails_is_named_and_the_rest_stands(tmp_path, scheduler):
     assert outcome.done == 3
     again = prepare_survey(make_request(step=4), str(tmp_path / "map.npz"), tmp_path / "out")
     assert again.chunks == [(0, 1)]
-    cells = again.store.notes.layout.cells_of((0, 1))
-    assert (again.store.layer("best_class")[cells] == 255).all()
-    assert (again.store.layer("best_class")[:] == 255).sum() == 16 * 14
     with pytest.raises(PlanningError, match="cannot be written: No room; finished chunks are ke"):
-        run_survey(again.job, again.chunks, settings, task=refuse_one)
+        run_survey(
+            again.job, again.chunks, settings, task=lambda *_: ChunkReport(refusal="No room")
+        )
 
 
 def test_a_survey_ends_when_no_worker_is_left(tmp_path):
@@ -193,39 +189,22 @@ def test_signals_end_a_survey_but_those_that_are_ignored_stay_so():
         for one, handler in before.items():
             signal.signal(one, handler)
 
-    def enter():  # in another thread, which may set no signals
-        with end_as_by_ctrl_c():
-            return True
-
-    with ThreadPoolExecutor() as other:
-        assert other.submit(enter).result(10.0)
-
 
 # Workers.
 
 
 @pytest.mark.slow
-def test_workers_look_around_once_a_second_and_those_of_another_kind_are_refused(ground):
-    """At 50 looks a second, each server of Dask takes a percent of a core at rest."""
-
-    def find_period(dask_worker) -> float:
-        return dask_worker.periodic_callbacks["tick"].callback_time
-
-    def find_scheduler_period(dask_scheduler) -> float:
-        return dask_scheduler.periodic_callbacks["tick"].callback_time
-
+def test_workers_of_another_kind_are_refused(ground):
     job = prepare_survey(make_request(), str(ground), ground.with_name("out")).job
     elsewhere = ground.with_name("elsewhere")
     with open_client(ClusterSettings(workers=1)) as client:
-        assert set(client.run(find_period).values()) == {1000.0}
-        assert client.run_on_scheduler(find_scheduler_period) == 1000.0
         workers = list(client.nthreads())
         check_workers(job, client, workers)
         with pytest.raises(PlanningError, match=r"worker tcp://.* has version .*, not 99\.0"):
             check_workers(replace(job, version="99.0"), client, workers)
         with pytest.raises(PlanningError, match=f"does not see {elsewhere}"):
             check_workers(replace(job, store=elsewhere), client, workers)
-        client.run(forget_package)
+        client.run(exec, "import sys; sys.modules['rover_physics'] = None")
         with pytest.raises(PlanningError, match="cannot import rover_planner: "):
             check_workers(job, client, workers)
 
@@ -250,6 +229,8 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (["--headings", "65"], "headings is 65; it must be 1 to 64"),
+        (["--step", "0"], "step is 0; it must be 1 to 10000"),
         (["--workers", "100000"], "100000 workers need "),
         (["--memory-limit", "lots"], "memory limit is 'lots'; it must be a size such as 1GiB"),
         (["--memory-limit", "100MB"], "a worker has 100 MB: give a smaller --chunk"),

@@ -199,9 +199,6 @@ def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
     found = layers_of(whole.store)
     assert_same_bits(found, layers_of(parts.store))
     assert step > 1 or len(np.unique(found["first_limit"])) > 3
-    moved = replace(terrain, origin=(0.0, 0.0))
-    tile = survey_tile(request, moved, places_on(terrain, step))["first_limit"]
-    assert (tile != found["first_limit"].ravel()).mean() < 1e-3  # coordinates round differently
 
 
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])

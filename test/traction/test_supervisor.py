@@ -34,11 +34,11 @@ class Rig:
         if "cmd_vel" in names:
             service.take_command(self.speed, 0.0, self.now)
 
-    def run(self, seconds, *names, clock_fault=""):
+    def run(self, seconds, *names):
         for _ in range(round(seconds / PERIOD)):
             self.now += PERIOD
             self.send(names or INPUTS)
-            self.commands.append(self.supervisor.update(self.now, clock_fault))
+            self.commands.append(self.supervisor.update(self.now))
         return self.commands[-1]
 
 
@@ -57,8 +57,6 @@ def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_ena
     assert rig.run(1.0).state == "disabled"
     assert supervisor.set_enabled(True)[0]
     assert rig.run(PERIOD).state == "driving"
-    assert supervisor.set_enabled(False) == (True, "disabled")
-    assert rig.run(PERIOD).state == "disabled"
 
 
 def test_the_watch_of_the_path_holds_the_rover_and_where_it_is_expected_so_does_its_silence():
@@ -110,16 +108,6 @@ def test_brake_coast_and_hold_without_wheel_rates_give_no_torque(policy, lost, b
     assert rig.run(0.1).brake == (policy == "brake")  # hold takes over again
 
 
-def test_a_rover_that_is_commanded_to_stand_is_held_after_a_moment():
-    rig = Rig()
-    rig.run(1.0)
-    rig.speed = rig.rate = 0.0
-    assert rig.run(STANDSTILL_DELAY - 0.1).state == "driving"
-    assert rig.run(0.2).state == "standstill"
-    rig.speed = 0.03
-    assert rig.run(PERIOD).state == "driving"
-
-
 def test_driving_goes_on_from_the_torques_of_rest():
     rig = Rig(torque_rate=1.0)
     rig.rate, rig.pitch = 0.0, -np.radians(20.0)
@@ -145,13 +133,12 @@ def test_an_input_that_is_bad_every_other_time_is_one_fault():
     assert rig.run(RECOVERY_TIME + 0.1).state == "driving"
 
 
-def test_a_fault_found_elsewhere_is_taken_into_the_next_update():
+def test_a_fault_found_elsewhere_counts_from_the_next_update_on():
     rig = Rig()
     rig.run(1.0)
     rig.supervisor.trip("updates came too late")
-    assert rig.run(PERIOD).fault == "updates came too late"
+    assert rig.run(RECOVERY_TIME - PERIOD).fault == "updates came too late"
     assert rig.run(1.0).state == "driving"
-    assert rig.run(PERIOD, clock_fault="the clock was stepped back").state == "fault"
 
 
 def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_otherwise():
@@ -167,7 +154,8 @@ def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_othe
     rig.speed = 0.03
     assert rig.run(2.2).state == "stalled"
     rig.speed = 0.0
-    assert rig.run(1.0).state == "standstill"
+    assert rig.run(STANDSTILL_DELAY - 0.1).state == "driving"
+    assert rig.run(0.2).state == "standstill"
     rig.speed = 0.03
     assert rig.run(1.0).state == "driving"
     rig.run(2.0)

@@ -79,27 +79,13 @@ def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(work, f
 
     for number in (1, 2, 3):
         work.ask(work_on(number))
+        assert work.progress.seconds < 0.5  # it does not count from an older result
         wait_until(lambda count=number: len(found) == count, "the verdict")
-    assert found == [1, 2, 3] and work.progress
+        wait_until(lambda: work.progress.seconds > 0.5, "time without a result")
+    assert found == [1, 2, 3]
     go_on.set()
     wait_for_idle(work)
     assert found[3:] == ["rest of 3"]
-
-
-def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_one(work, found):
-    go_on = threading.Event()
-
-    def work_on(is_new):
-        if is_new:
-            go_on.wait()
-        yield "verdict"
-        go_on.wait()
-
-    work.ask(work_on(False))
-    wait_until(lambda: found and work.progress.seconds > 0.5, "time without a result")
-    work.ask(work_on(True))
-    assert work.progress.seconds < 0.5
-    go_on.set()
 
 
 @pytest.mark.timed
@@ -158,9 +144,11 @@ def judge():
         yield made
 
 
-def test_changes_add_up_although_the_judgements_between_are_dropped(judge):
+def test_changes_add_up_and_no_old_path_is_chosen_while_others_are_planned(judge):
     session = judge.session
     session.plan_to(np.array([1.5, 0.5]))
+    with pytest.raises(PlanningError, match="the listed paths are old"):
+        session.show_path(1)
     session.change_rover([("friction",)], 0.5)
     session.take_change(session.wanted.change_options(joint_angles={"arm_yaw": 0.3}))
     session.take_change(session.wanted.change_options(soil="dry_sand"))
@@ -178,10 +166,3 @@ def test_an_error_of_the_judgement_is_raised_and_stops_it(judge):
     with pytest.raises(ValueError, match="many"):
         judge.finish()
     assert judge.session.is_outdated and judge.session.is_stopped
-
-
-def test_a_path_of_an_old_list_is_not_chosen_while_others_are_planned(judge):
-    session = judge.session
-    session.plan_to(np.array([1.5, 0.5]))
-    with pytest.raises(PlanningError, match="the listed paths are old"):
-        session.show_path(1)

@@ -9,15 +9,14 @@ import pytest
 
 from rover_physics.errors import RoverFileError
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.command.prediction_files import read_prediction, write_prediction
 from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.paths import describe_changes, describe_paths, describe_verdict
-from rover_planner.viewer.state.scenario import CANDIDATES, Scenario
-from rover_planner.viewer.state.session import ViewSession
+from rover_planner.viewer.state.scenario import CANDIDATES
 from support.grounds import make_terrain, wall_at, waves
 from support.rovers import M2020
 from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
@@ -66,10 +65,7 @@ def test_before_and_after_stay_while_something_differs_from_the_loaded_rover():
     assert ["arm_yaw [rad]", "3.14159", "0.5"] in changes["rover"]
     session.take_change(session.wanted.as_loaded())
     assert session.shown.reference is None
-
-
-def test_a_kept_reference_takes_the_place_of_the_loaded_rover_also_for_another_policy():
-    session = session_on(ramp)
+    # A kept reference takes the place of the loaded rover, also for another policy.
     session.change_rover(FRICTION, 0.7)
     session.keep_reference(session.wanted)
     assert session.shown.reference is None
@@ -106,11 +102,10 @@ def test_a_refused_change_alters_nothing_and_says_why():
     shown = session.shown
     with pytest.raises(RoverFileError):
         session.change_rover([("suspension", "wheels", "middle", 0)], 0.4)
+    turned = session.wanted.change_options(joint_angles={"arm_yaw": float("nan")})
     for change in (
         lambda: session.plan_to(np.array([np.nan, 0.0])),
-        lambda: session.take_change(
-            session.wanted.change_options(joint_angles={"arm_yaw": float("nan")})
-        ),
+        lambda: session.take_change(turned),
     ):
         change()
         assert session.refusal and session.shown.path is shown.path
@@ -180,8 +175,6 @@ def test_a_recorded_prediction_is_shown_as_it_was_recorded_until_the_rover_is_ch
     assert shown.verdict.reason == verdict.reason != ""
     assert shown.verdict.first_failure == verdict.first_failure
     assert shown.path.limits.rows.prediction.waypoint.max() == verdict.first_failure
-    loads = shown.path.limits.rows.prediction.wheel_loads
-    np.testing.assert_array_equal(loads, prediction.wheel_loads[: len(loads)])
     stuck = (*[""] * (len(reasons) - 1), "the wheel is stuck")
     session.replay(again, stuck)  # which takes precedence over the model
     assert session.shown.verdict.reason == "the wheel is stuck"
@@ -212,11 +205,9 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     assert (session.wanted.rover.friction, session.wanted.rover.manipulator.payload) == (0.7, 0.5)
     assert session.wanted.options.model.arm_angles == angles
     session.change_rover([("wheel", "width")], 0.07)
-    poses, rover = session.shown.path.poses, session.wanted.rover
-    again = replace(options, friction=None, payload=None)
-    _, expected = judge_path(rover, ground, poses, again, sigmas=2.0)
-    assert session.shown.verdict.max_sinkage == expected.max_sinkage > verdict.max_sinkage
-    assert session.shown.verdict.policy == "optimal"
+    changed = session.shown.verdict
+    assert changed.max_sinkage > verdict.max_sinkage and changed.policy == "optimal"
+    assert session.wanted.options.map_sigmas == 2.0
 
 
 def test_default_ends_are_on_known_ground_where_the_rover_can_stand_at_most_10_m_apart():
@@ -224,11 +215,6 @@ def test_default_ends_are_on_known_ground_where_the_rover_can_stand_at_most_10_m
     (x, y, _), goal = choose_ends(LSR1, ground)
     assert goal == pytest.approx((2.0, 0.0, 0.0))
     assert 1.0 < np.hypot(x + 2.0, y) < 2.5 and x < 0.0
-    spirit = load_terrain("spirit").fill_gaps(0.2)
-    start, goal = choose_ends(LSR1, spirit)
-    way = np.linspace(start[:2], goal[:2], 100)
-    assert np.isfinite(spirit.elevation_at(way[:, 0], way[:, 1])).all()
-    assert ViewSession(Scenario(LSR1, LSR1, spirit, start, goal)).shown.verdict.traversable
     start, goal = choose_ends(LSR1, Terrain(np.zeros((1200, 1200)), 0.1, (0.0, 0.0)))
     assert np.hypot(goal[0] - start[0], goal[1] - start[1]) == pytest.approx(10.0)
     steep = choose_ends(LSR1, make_terrain(lambda x, y: 2.0 * x))  # it can stand nowhere

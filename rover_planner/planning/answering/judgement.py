@@ -156,7 +156,7 @@ def _report_drive(candidate: Candidate) -> dict[str, Any]:
     entries: dict[str, Any] = {"first_failure": failure}
     if failure >= 0:
         entries["failure_pose"] = prediction.poses[failure]
-        entries["failure_distance"] = candidate.passable_share * candidate.length
+        entries["failure_distance"] = candidate.passable_length
     return {
         **entries,
         "policy": verdict.policy,

@@ -104,20 +104,25 @@ class Snapshot:
         if refused is not None:
             return refused
         judge, ends = self._judge(), (np.asarray(start, float), np.asarray(goal, float))
-        if self.settings.parameters.planner == LATTICE:
-            return self._search_around(judge, ends, None)
-        are_on_map = all(judge.terrain.contains(*end[:2]) for end in ends)
+        start_is_on_map, goal_is_on_map = (judge.terrain.contains(*end[:2]) for end in ends)
+        are_on_map = start_is_on_map and goal_is_on_map
+        may_search = are_on_map or (start_is_on_map and self.settings.lattice.frontier)
+        planner = self.settings.parameters.planner
+        if planner == LATTICE:
+            if may_search:
+                return self._search_around(judge, ends, None)
+            tolerance = 0.0
         if not (are_on_map or tolerance):  # no candidate helps: one tells as much as all
             judge = replace(judge, options=judge.options.change(count=1))
         search = judge.search(*ends, tolerance)
         judged = self._describe(judge, search.chosen, search)
         if not are_on_map and not judged.traversable:
-            return replace(judged, is_brief=True)  # of what lies off the map nothing is told
+            judged = replace(judged, is_brief=True)  # of what lies off the map nothing is told
         starts_unobserved = (
             judged.code == UNOBSERVED_CODE and search.chosen.verdict.first_failure == 0
         )
-        is_final = judged.traversable or starts_unobserved
-        if is_final or self.settings.parameters.planner == FAN:
+        is_final = judged.traversable or starts_unobserved or not may_search
+        if is_final or planner == FAN:
             return judged
         return self._search_around(judge, ends, judged)
 

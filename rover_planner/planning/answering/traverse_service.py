@@ -221,10 +221,12 @@ class TraverseService:
             return {}, known
         classes = ground.assume_classes(known.terrain, told)
         last = self._laid  # which another thread may replace meanwhile
-        if last is None or last[:2] != (known, classes):
+        if last is None or last[0].terrain is not known.terrain or last[1] != classes:
             laid = replace(known, terrain=lay_friction(known.terrain, classes))
             pack_ground(laid.terrain)
             last = self._laid = known, classes, laid
+        elif last[0] is not known:  # the same map has arrived once more
+            last = self._laid = known, classes, replace(known, terrain=last[2].terrain)
         return classes, last[2]
 
     def _keep_map(self, about: KnownMap) -> bool:

@@ -248,7 +248,7 @@ class PathMonitor:
         if judgement.traversable:
             return None
         assert judgement.candidate is not None
-        away = judgement.candidate.passable_share * judgement.candidate.length
+        away = judgement.candidate.passable_length
         return replace(judgement, reason=f"{away:.2f} m ahead: {judgement.reason}")
 
     def _check_rest(self, path: WatchedPath, snapshot: Snapshot) -> PathJudgement:

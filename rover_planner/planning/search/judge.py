@@ -43,7 +43,7 @@ from rover_planner.planning.path_query import (
     Pose,
     answer_path_query,
     check_path,
-    choose,
+    choose_by_chance,
 )
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 from rover_planner.planning.search.unobserved_check import UnobservedCheck, physical
@@ -54,6 +54,10 @@ RISK = 2.0
 """Further cost of a metre at the limit, in metres of level ground."""
 LEAST_CHANCE, LEAST_SHARE = 0.001, 0.3
 """Least accepted chance, and share of friction and torque limit, for which pieces are judged."""
+BACK = (0.0, True)
+"""Curvature [1/m] of a rover that drives straight back, and that it drives backwards."""
+OTHER_MOTIONS = (BACK, (math.inf, False), (-math.inf, False))
+"""All motions but straight ahead: back, and turns on the spot."""
 _QUERIES_PER_RING = 4
 """Other goals on a ring around the goal that are tried at most."""
 
@@ -125,7 +129,12 @@ class PathJudge:
         """
         if not answer.traversable:
             return answer
-        held = choose(tuple(self._hold_path(candidate) for candidate in answer.candidates))
+        held = choose_by_chance(
+            self.rover,
+            self.terrain,
+            [self._hold_path(candidate) for candidate in answer.candidates],
+            self.options,
+        )
         return held if held.traversable else replace(held, nearest=answer.nearest)
 
     def _hold_path(self, candidate: Candidate) -> Candidate:
@@ -235,13 +244,20 @@ class PathJudge:
         return judged
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
-        """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
+        """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none.
+
+        A rover that slips ahead up a slope of sand stands there if it can back out.
+        """
         if self.terrain.elevation_std is None or not self.options.map_sigmas:
             self.poses += len(poses)
             model = pack_model(self.rover, self.terrain, self.options.model)
             codes = find_codes(model.limits, model.evaluate(poses))
         else:
             codes = list(self._judge_standing(poses).codes)
+        if self.terrain.soil is not None or self.options.model.soil is not None:
+            refused = np.flatnonzero([code != "" for code in codes])
+            for row in refused[self._stand_otherwise(poses[refused], BACK)].tolist():
+                codes[row] = ""
         for row in self._find_unobserved(poses[:, None, :], codes):
             codes[row] = UNOBSERVED_CODE
         return tuple(codes)
@@ -249,17 +265,33 @@ class PathJudge:
     def refuse(self, pose: Pose) -> tuple[str, str]:
         """Return code and reason why the rover cannot stand at a pose, empty if it can."""
         verdict = self._judge_standing(pose[None, :])
-        if self.unobserved_check is not None and self._find_unobserved(
-            [pose[None, :]], verdict.codes
-        ):
+        code, reason = verdict.codes[0], verdict.reasons[0]
+        if code and self._stand_otherwise(pose[None, :], *OTHER_MOTIONS)[0]:
+            code, reason = "", ""
+        if self.unobserved_check is not None and self._find_unobserved([pose[None, :]], [code]):
             return UNOBSERVED_CODE, self.unobserved_check.describe()
-        return verdict.codes[0], verdict.reasons[0]
+        return code, reason
 
-    def _judge_standing(self, poses: NDArray[np.float64]) -> Verdict:
-        """Judge single poses (n, 3), wheels ahead."""
+    def _stand_otherwise(
+        self, poses: NDArray[np.float64], *motions: tuple[float, bool]
+    ) -> NDArray[np.bool_]:
+        """Return (n,) whether the rover stands at poses (n, 3) in any of some motions."""
+        stands = np.zeros(len(poses), bool)
+        for motion in motions:
+            rows = np.flatnonzero(~stands)
+            if len(rows):
+                codes = self._judge_standing(poses[rows], *motion).codes
+                stands[rows] = [code == "" for code in codes]
+        return stands
+
+    def _judge_standing(
+        self, poses: NDArray[np.float64], curvature: float = 0.0, backward: bool = False
+    ) -> Verdict:
+        """Judge single poses (n, 3), by default wheels ahead."""
         self.poses += len(poses)
-        ahead, model, sigmas = np.zeros(len(poses)), self.options.model, self.options.map_sigmas
-        return judge_poses(self.rover, self.terrain, poses, ahead, model, sigmas=sigmas)[1]
+        bends, sigmas = np.full(len(poses), curvature), self.options.map_sigmas
+        model = replace(self.options.model, backward=backward)
+        return judge_poses(self.rover, self.terrain, poses, bends, model, sigmas=sigmas)[1]
 
     def _find_unobserved(
         self, pieces: Sequence[NDArray[np.float64]] | NDArray[np.float64], codes: Sequence[str]

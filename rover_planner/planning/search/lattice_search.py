@@ -140,17 +140,21 @@ class LatticeSearch:
         self._refused: list[tuple[int, float]] = []
 
     def run(self, allowed: Callable[["LatticeSearch"], bool]) -> SearchProgress:
-        """Search until the best path is found, no path is left, or it is not allowed to go on."""
-        try:
-            for caution in CAUTIONS:
-                while allowed(self) and not self._step(caution):
-                    check_interruption()
-                if self.progress.exhausted:
-                    break
-        finally:
-            for edge, cost in self._refused:  # closed for this search only
-                self.edges.write(edge, "", cost)
+        """Search until the best path is found, no path is left, or it is not allowed to go on.
+
+        Afterwards call `reopen`.
+        """
+        for caution in CAUTIONS:
+            while allowed(self) and not self._step(caution):
+                check_interruption()
+            if self.progress.exhausted:
+                break
         return self.progress
+
+    def reopen(self) -> None:
+        """Open the edges again that are closed for this search only."""
+        for edge, cost in self._refused:
+            self.edges.write(edge, "", cost)
 
     def _step(self, caution: float) -> bool:
         """Find the shortest path and ask the model about it; return whether this phase is over."""
@@ -280,7 +284,7 @@ class LatticeSearch:
             kept.write(index, code, np.inf)
             self._note(index, 0.0)
         else:
-            kept.costs[index] = np.inf
+            kept.write(index, code, np.inf)
 
 
 def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
-from rover_physics.rover.steering_joints import tightest_radius
+from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import check_pose, generate_candidates, path_length
 from rover_planner.planning.dubins import shortest_dubins_path
@@ -238,7 +238,14 @@ class _PathFinder:
             self._memory.keep_path(self._query, progress.pieces)
             return self._make_result(FOUND, "", path=(progress.best, progress.cost))
         search = self._prepare()
-        search.run(self._allowed)
+        try:
+            return self._run(search)
+        finally:
+            search.reopen()
+
+    def _run(self, search: LatticeSearch) -> SearchResult:
+        """Search the lattice."""
+        progress = search.run(self._allowed)
         if progress.best is not None:
             path = self._smooth(progress)
             return self._make_result(FOUND, self._describe_rest(path[0]), search, path=path)
@@ -277,20 +284,26 @@ class _PathFinder:
         return f"the {columns * cell:.0f} m x {rows * cell:.0f} m around start and goal"
 
     def _try_known_paths(self) -> None:
-        """Take the last path between the same ends, or else the direct curve, if it passes.
+        """Take the last path between the same ends, or else the best direct one, if any passes.
 
         It is a first path, long before the lattice is prepared.
         """
-        for pieces in (self._memory.recall_path(self._query), self._make_direct_path()):
-            if not pieces:
-                continue
-            path = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
-            if not path.verdict.traversable:
-                continue
-            priced = self._price(pieces, path)
-            if all(np.isfinite(one.cost) for one in priced):
-                self._progress.keep(priced, path)
-                return
+        if not self._try_path(self._memory.recall_path(self._query)):
+            for piece in self._make_direct_paths():
+                self._try_path([piece])
+
+    def _try_path(self, pieces: list[Piece]) -> bool:
+        """Keep a path that passes if it is the best so far; return whether it passes."""
+        if not pieces:
+            return False
+        path = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
+        if not path.verdict.traversable:
+            return False
+        priced = self._price(pieces, path)
+        cost = sum(one.cost for one in priced)
+        if cost < self._progress.cost:
+            self._progress.keep(priced, path)
+        return math.isfinite(cost)
 
     def _price(self, pieces: list[Piece], path: Candidate) -> list[Piece]:
         """Return the pieces of a path that passes with their costs."""
@@ -302,16 +315,25 @@ class _PathFinder:
         costs = dict(zip(new, (one.cost for one in judged), strict=True))
         return [replace(one, cost=costs.get(k, one.cost)) for k, one in enumerate(pieces)]
 
-    def _make_direct_path(self) -> list[Piece]:
-        """Return the direct curve from start to goal as one piece, none if they are the same."""
-        poses = generate_candidates(
-            self._start,
-            self._goal,
-            count=1,
-            waypoint_spacing=self._query.options.waypoint_spacing,
-            min_radius=self._radius,
-        )[0]
-        return [Piece(poses, Gear.FORWARD)] if len(poses) > 1 else []
+    def _make_direct_paths(self) -> list[Piece]:
+        """Return the direct curve from start to goal, and turns on the spot if they are shorter.
+
+        There is none if start and goal are the same.
+        """
+        rover, found = self._query.rover, []
+        swing = swing_radius(rover) if can_turn_on_the_spot(rover) else None
+        for gear, turn in ((Gear.FORWARD, None), (Gear.ON_THE_SPOT, swing)):
+            poses = generate_candidates(
+                self._start,
+                self._goal,
+                count=1,
+                waypoint_spacing=self._query.options.waypoint_spacing,
+                min_radius=self._radius,
+                swing_radius=turn,
+            )[0]
+            if len(poses) > 1 and not (found and np.array_equal(poses, found[0].poses)):
+                found.append(Piece(poses, gear))
+        return found
 
     def _prepare(self) -> LatticeSearch:
         """Return the search, with the estimates of the ground and the connections of the ends."""
@@ -359,7 +381,8 @@ class _PathFinder:
         smoothed = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
         if not smoothed.verdict.traversable:
             smoothed, pieces = best, progress.pieces
-        self._memory.keep_path(self._query, pieces)
+        if not self._to_frontier:  # it ends before the goal
+            self._memory.keep_path(self._query, pieces)
         return smoothed, sum(one.cost for one in pieces)
 
     def _make_result(

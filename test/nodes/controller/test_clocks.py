@@ -16,20 +16,6 @@ TIGHT = {f"{what}_timeout": 0.3 for what in ("joint_states", "imu", "watchdog", 
 """Several times the defaults, for the sake of busy machines."""
 
 
-class SimulatedClock:
-    """Publishes /clock in steps of its owner's choice."""
-
-    def __init__(self, rover):
-        self.time, self.step = 1_000_000 * NANOSECONDS, 10_000_000
-        self._publisher = rover.create_publisher(ClockMessage, "/clock", 10)
-        rover.create_timer(0.01, self._tick)
-
-    def _tick(self):
-        self.time += self.step
-        if self.step:
-            self._publisher.publish(ClockMessage(clock=ns_to_stamp(self.time)))
-
-
 def wait_for_rest(rover, began):
     """Return the time from `began` [ns] to the last command that was sent before rest [s]."""
 
@@ -45,15 +31,23 @@ def wait_for_rest(rover, began):
 def test_a_simulated_clock_that_stops_and_stamps_that_do_not_advance_are_faults_in_time(
     rover, start_controller
 ):
-    clock = SimulatedClock(rover)
+    times = [1_000_000 * NANOSECONDS]
+    clock = rover.create_publisher(ClockMessage, "/clock", 10)
+
+    def tick():
+        times.append(times[-1] + 10_000_000)
+        clock.publish(ClockMessage(clock=ns_to_stamp(times[-1])))
+
+    timer = rover.create_timer(0.01, tick)
     start_controller(use_sim_time=True, **TIGHT)
     rover.wait_until_driven()
-    began, clock.step = time.time_ns(), 0
+    began = time.time_ns()
+    timer.cancel()
     assert wait_for_rest(rover, began) < BOUND
     wait_until(lambda: "/clock stands still" in rover.status.message, "the reason")
-    clock.step = 10_000_000
+    timer.reset()
     rover.wait_until_driven()
-    began, frozen = time.time_ns(), clock.time
+    began, frozen = time.time_ns(), times[-1]
     rover.stamp = lambda: frozen
     assert wait_for_rest(rover, began) < BOUND
     wait_until(lambda: "stamps do not advance" in rover.status.message, "the reason")

@@ -5,6 +5,7 @@ import math
 import signal
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from rover_planner.nodes.traction_controller import TractionController
+from rover_planner.ros.qos import topic_qos
 from support.ros_fixtures import PATIENT, call, run_in_executor
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 
 @pytest.fixture
@@ -99,6 +101,20 @@ def test_an_emergency_stop_from_before_the_start_is_heard(rover, start_controlle
     button.publish(Bool(data=True))
     start_controller()
     wait_until(lambda: rover.state == "emergency_stop", "the stop")
+
+
+def test_a_stop_of_the_watch_holds_the_rover_and_so_does_the_loss_of_the_watch(
+    rover, start_controller
+):
+    watch = rover.create_publisher(Bool, "traverse_server/stop", topic_qos())
+    start_controller(stop_timeout=0.5)
+    wait_until(lambda: "waiting for traverse_server/stop" in rover.status.message, "the fault")
+    go_on = partial(watch.publish, Bool(data=False))
+    repeat_until(go_on, lambda: rover.state == "driving" and rover.push > 0.0, "the drive")
+    wait_until(lambda: "stop stale" in rover.status.message, "the fault of a silent watch")
+    repeat_until(go_on, lambda: rover.state == "driving", "the drive")
+    watch.publish(Bool(data=True))
+    wait_until(lambda: "stop is true" in rover.status.message, "the stop")
 
 
 def test_a_node_that_ends_sends_zeros_last(rover, controller):

@@ -19,7 +19,6 @@ from rover_planner.nodes import mission_planner
 from rover_planner.nodes.mission.drive import DriveFailedError
 from rover_planner.nodes.mission_planner import NoAnswerError, main
 from rover_planner.nodes.programs import MissionOptions, read_arguments
-from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, rock_left, wall_at, waves
@@ -35,28 +34,6 @@ def test_ros_that_is_shut_down_while_the_node_waits_is_the_end_of_waiting(planne
     rclpy.shutdown(context=planner.context)  # as where a signal comes between two looks
     with pytest.raises(ExternalShutdownException):
         planner.wait_for_server()
-
-
-def test_errors_while_the_node_waits_are_told(planner):
-    planner.create_timer(0.01, lambda: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        planner.wait_for_server()
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        (["--start=0,0,0"], "--goal"),
-        (["--start=0,0", "--goal=1,0,0"], "'0,0' is no pose; it must be X,Y,YAW"),
-        (["--start=0,0,0", "--goal=1,0,0", "--map=opportunity"], "presets are spirit"),
-        (["--start=0,0,0", "--goal=1,0,0", "--timeout=nan"], "timeout is nan; it must be a time"),
-    ],
-)
-def test_bad_words_are_exit_code_2_with_one_line(capfd, words, names):
-    assert main(words) == 2
-    err = capfd.readouterr().err
-    assert err.startswith("mission_planner: ") and err.count("\n") == 1 and len(err) <= 301
-    assert names in err
 
 
 def test_negative_numbers_need_no_equals_sign_and_words_of_ros_are_put_aside():
@@ -153,17 +130,6 @@ def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for(run_pl
     code, _, err = run_planner(NEAR, "--timeout=1")
     assert code == 4 and err.count("\n") == 1
     assert "in vain for the service /traverse_server/can_traverse and the topic /tra" in err
-
-
-def test_a_server_with_another_name_is_found_by_remapping(ros, run_planner):
-    judge = ["--ros-args", "-r", "__node:=judge"]
-    server = ros.start(TraverseServer, judge, time_budget=60.0)
-    server.service.take_terrain(make_terrain(waves))
-    names = ("can_traverse", "verdict", "wheel_loads", "slip_ratios")
-    words = [f"traverse_server/{name}:=judge/{name}" for name in names]
-    remapped = [word for name in words for word in ("-r", name)]
-    code, out, _ = run_planner(NEAR, "--timeout=20", "--ros-args", *remapped)
-    assert (code, "goal 1: yes" in out) == (0, True)
 
 
 def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again(

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
-from rclpy.node import Node
 
 from msg_adapters.results.grids import VALUES
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
@@ -18,6 +17,8 @@ from support.ros_fixtures import call, hear
 from support.waiting import wait_until
 
 PASSABLE, _, _, IMPASSABLE, UNKNOWN = VALUES.tolist()
+THERE = (1.5, 2.5), (1.5, 2.5)
+"""Part of the map where a rock will be [m]."""
 
 
 def rock_at(place):
@@ -25,16 +26,10 @@ def rock_at(place):
     return lambda x, y: waves(x, y) + 0.5 * ((abs(x - place) < 0.3) & (abs(y - place) < 0.3))
 
 
-class Costmap(Node):
-    """A subscriber such as the static layer of a costmap."""
-
-    def __init__(self, ros, names):
-        super().__init__("costmap", context=ros.context)
-        self.grids = {
-            name: hear(self, OccupancyGrid, f"{SERVER}/hazard_map/{name}", latched_qos())
-            for name in names
-        }
-        self.ask = self.create_client(GetMap, f"{SERVER}/get_hazard_map")
+def hear_grids(client, *names):
+    """Return lists that get the grids which are published from now on, by name of the topic."""
+    topics = (f"{SERVER}/hazard_map/{name}" for name in names)
+    return [hear(client, OccupancyGrid, topic, latched_qos()) for topic in topics]
 
 
 def cells(grid, x=(-1.0, 1.0), y=(-1.0, 1.0)):
@@ -48,8 +43,18 @@ def cells(grid, x=(-1.0, 1.0), y=(-1.0, 1.0)):
     return values[rows, columns]
 
 
-def is_free(grids, *part):
-    return bool(grids) and (cells(grids[-1], *part) == PASSABLE).all()
+def is_free(grids):
+    return bool(grids) and (cells(grids[-1]) == PASSABLE).all()
+
+
+def has_rock(grids):
+    """Return whether a rock at (2, 2) is shown."""
+    return (cells(grids[-1], *THERE) == IMPASSABLE).any()
+
+
+def ask_for_grid(client):
+    ask = client.create_client(GetMap, f"{SERVER}/get_hazard_map")
+    return call(ask, GetMap.Request()).map
 
 
 @pytest.fixture
@@ -59,63 +64,31 @@ def mapping(start_server, client):
     return server
 
 
-def test_a_late_subscriber_gets_the_map_and_a_change_changes_the_grid_around_it(
-    mapping, client, ros
-):
-    costmap = ros.spin(Costmap(ros, ("worst", "best", "heading_1")))
-    for grids in costmap.grids.values():
+def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client):
+    worst, best, first = hear_grids(client, "worst", "best", "heading_1")
+    for grids in (worst, best, first):
         wait_until(lambda grids=grids: is_free(grids), "the whole map", 60.0)
-    worst, best = costmap.grids["worst"], costmap.grids["best"]
     grid, terrain = worst[-1], mapping.service.terrain
     assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(0.1)
     assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.05)
     assert (grid.info.height, grid.info.width) == terrain.elevation.shape
     assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
     wait_until(
-        lambda: call(costmap.ask, GetMap.Request()).map.data == worst[-1].data,
+        lambda: ask_for_grid(client).data == worst[-1].data,
         "the same map from the service",
     )
-    there, away = ((1.5, 2.5), (1.5, 2.5)), ((-2.0, 0.5), (-2.0, 0.5))
-    # A grid may be published before all its cells are judged.
-    wait_until(lambda: is_free(worst, *away) and is_free(best, *away), "the map", 60.0)
-    before = cells(worst[-1], *away)
     client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
-    wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
-    np.testing.assert_array_equal(cells(worst[-1], *away), before)
-    wait_until(lambda: (cells(best[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
+    for grids in (worst, best):
+        wait_until(lambda grids=grids: has_rock(grids), "the rock", 60.0)
+        assert is_free(grids)  # away from it
 
 
-def test_switched_off_no_cell_is_free_and_switched_on_it_is_that_of_the_newest_map(
-    mapping, client, ros
+def test_switched_off_no_cell_is_free_and_switched_on_none_of_what_was_judged_before(
+    mapping, client, monkeypatch
 ):
-    costmap = ros.spin(Costmap(ros, ("worst", "heading_1")))
-    worst, first = costmap.grids["worst"], costmap.grids["heading_1"]
+    worst, first = hear_grids(client, "worst", "heading_1")
+    judged, go_on = threading.Event(), threading.Event()
     wait_until(lambda: is_free(worst) and is_free(first), "the map", 60.0)
-    there = (1.5, 2.5), (1.5, 2.5)
-    wait_until(lambda: (cells(worst[-1], *there) == PASSABLE).all(), "where the rock will be")
-    assert client.set_parameter("hazard_map", False)[0]
-    for grids in (worst, first):
-        wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
-    client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
-    wait_until(lambda: mapping.service.terrain.elevation.max() > 0.4, "the rock in the map")
-    assert client.set_parameter("hazard_map", True)[0]
-    asked = []
-
-    def is_shown():
-        asked.append(call(costmap.ask, GetMap.Request()).map)
-        return is_free(worst)  # away from the rock
-
-    wait_until(is_shown, "the map", 60.0)
-    assert all((cells(grid, *there) != PASSABLE).any() for grid in asked if grid.data)
-    wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
-
-
-def test_what_was_judged_before_a_withdrawal_is_not_shown_after_it(
-    mapping, client, ros, monkeypatch
-):
-    costmap = ros.spin(Costmap(ros, ("worst",)))
-    worst, judged, go_on = costmap.grids["worst"], threading.Event(), threading.Event()
-    wait_until(lambda: is_free(worst), "the map", 60.0)
     show = HazardTopics._show
 
     def show_late(*given):
@@ -127,20 +100,12 @@ def test_what_was_judged_before_a_withdrawal_is_not_shown_after_it(
     client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.001, half=3.0, resolution=0.1))
     assert judged.wait(60.0), "the classes on the second map"
     assert client.set_parameter("hazard_map", False)[0]
-    wait_until(lambda: set(worst[-1].data) == {UNKNOWN}, "the withdrawal")
-    client.send_terrain(make_terrain(rock_at(0.0), half=3.0, resolution=0.1))
+    for grids in (worst, first):
+        wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
+    assert ask_for_grid(client).info.width == 0
+    client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
     assert client.set_parameter("hazard_map", True)[0]
     before = len(worst)
     go_on.set()
-    wait_until(lambda: len(worst) > before, "the third map", 60.0)
-    assert not any(is_free([grid]) for grid in worst[before:])
-
-
-def test_an_empty_answer_says_in_the_log_what_is_missing(start_server, client):
-    start_server()
-    ask = client.create_client(GetMap, f"{SERVER}/get_hazard_map")
-    assert call(ask, GetMap.Request()).map.info.width == 0
-    client.wait_for_log("get_hazard_map: an empty grid, the parameter hazard_map is false")
-    assert client.set_parameter("hazard_map", True)[0]
-    assert call(ask, GetMap.Request()).map.info.width == 0
-    client.wait_for_log("get_hazard_map: an empty grid, there is no map yet")
+    wait_until(lambda: has_rock(worst), "the third map", 60.0)
+    assert not any((cells(grid, *THERE) == PASSABLE).all() for grid in worst[before:])

@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A traverse server hears parameters, maps, cancels and signals while it works on a question."""
 
-import threading
 import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_srvs.srv import Trigger
 
-from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash, plan_request_hash
 from rover_physics import load_rover
 from rover_physics.names import WHEEL_JOINTS
-from rover_planner.planning.answering.snapshot import Snapshot
-from support.grounds import gap, make_terrain, wall_at, waves
+from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, begin_plan, verdict_of
-from support.ros_fixtures import call, hear
+from support.ros_fixtures import call, hear, run_in_executor
 from support.waiting import wait_until
 
 
@@ -24,6 +21,7 @@ def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(
 ):
     server = start_server(time_budget=600.0)
     client.send_terrain(make_terrain(waves))
+    first = server.service.known_map.fingerprint
     service = client.create_client(Trigger, f"{SERVER}/cancel")
     with endless():
         _, future = begin_plan(ros)
@@ -35,8 +33,23 @@ def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(
     assert answer.success and answer.message == "1 open questions cancelled"
     wait_until(future.done, "the answer")
     assert future.result().plan.poses == []
-    assert client.wait_for_verdict()["code"] == "cancelled"
+    verdict = client.wait_for_verdict()
+    assert verdict["code"] == "cancelled"
+    assert verdict["map_hash"] == first != server.service.known_map.fingerprint
     assert not call(service, Trigger.Request()).success
+
+
+def test_a_server_that_ends_refuses_an_open_question_at_once(start_server, client, ros, endless):
+    server = start_server(time_budget=600.0)
+    client.send_terrain(make_terrain(waves))
+    with endless():
+        _, future = begin_plan(ros)
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        began = time.monotonic()
+        run_in_executor(server, server.desk.close)
+        assert time.monotonic() - began < 1.5
+    wait_until(future.done, "the answer")
+    assert future.result().plan.poses == []
 
 
 def test_stamps_of_answers_differ_even_while_the_clock_is_paused(start_server, client):
@@ -82,27 +95,6 @@ def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, c
     wait_for(DiagnosticStatus.ERROR, "ZeroDivisionError")
 
 
-def test_a_question_keeps_the_map_it_was_asked_about(shared, monkeypatch):
-    server, client = shared.server, shared.client
-    client.heard["verdict"].clear()
-    first = server.service.known_map.fingerprint
-    find, begun, go_on = Snapshot.answer, threading.Event(), threading.Event()
-
-    def find_later(snapshot, *asked):
-        begun.set()
-        assert go_on.wait(60.0)
-        return find(snapshot, *asked)
-
-    monkeypatch.setattr(Snapshot, "answer", find_later)
-    _, future = begin_plan(shared.ros)
-    assert begun.wait(20.0), "the work on the question"
-    client.send_terrain(make_terrain(wall_at(0.5)))
-    go_on.set()
-    wait_until(future.done, "the answer")
-    assert len(future.result().plan.poses) > 2
-    assert client.wait_for_verdict()["map_hash"] == first != server.service.known_map.fingerprint
-
-
 def test_each_client_can_tell_its_own_verdict(shared):
     client = shared.client
     client.heard["verdict"].clear()
@@ -122,19 +114,6 @@ def test_each_client_can_tell_its_own_verdict(shared):
         assert verdict["path_hash"] == path_hash(plan)
         stamp = f"{plan.header.stamp.sec}.{plan.header.stamp.nanosec:09d}"
         assert verdict["path_stamp"] == stamp
-
-
-def test_the_log_has_one_line_for_each_new_content(shared):
-    server, client, terrain = shared.server, shared.client, make_terrain(gap)
-    client.send_terrain(terrain)
-    for _ in range(2):
-        before = server.service.known_map
-        stamp = server.get_clock().now().to_msg()
-        client.send_cloud(terrain_to_point_cloud(terrain, "map", stamp))
-        wait_until(lambda b=before: server.service.known_map is not b, "the map")
-    other = make_terrain(wall_at(0.5))
-    client.send_cloud(terrain_to_point_cloud(other, "map"))
-    wait_until(lambda: sum("map from" in line for line in client.logs) == 2, "the second line")
 
 
 def test_map_parameters_act_on_the_map_that_is_there(shared):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bounds on uncertain maps hold the prediction and what maps drawn at random give."""
 
-import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -15,7 +14,6 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import bdtrik
 
 from rover_physics import Rover, SweepOptions, Terrain, judge_path
-from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.errors import ModelError
 from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.status import BoundStatus
@@ -70,13 +68,10 @@ def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterato
     """
     rng = np.random.default_rng(seed)
     shape, width = terrain.elevation.shape, length / terrain.resolution / 2.0
-    smooth = partial(gaussian_filter, sigma=width, mode="wrap")
-    impulse = np.zeros(shape)
-    impulse[shape[0] // 2, shape[1] // 2] = 1.0
-    scale = 1.0 / np.sqrt((smooth(impulse) ** 2).sum())
     for _ in range(count):
-        error = scale * smooth(rng.standard_normal(shape))
-        yield replace(terrain, elevation=terrain.elevation + terrain.elevation_std * error)
+        error = gaussian_filter(rng.standard_normal(shape), width, mode="wrap")
+        error *= terrain.elevation_std / error.std()
+        yield replace(terrain, elevation=terrain.elevation + error)
 
 
 SLOPE = plane(0.2, 0.1, half=3.0)
@@ -93,13 +88,11 @@ def draw_path(rover, terrain, poses, length, count, seed, **arguments):
 
     Returns:
         Numbers (3,), over all maps: waypoints with bounds, those of them that did not settle or
-        have a value outside, and waypoints that settle but have no bounds; and by value the ratio
-        of the width of the bounds to the range of the random values.
+        have a value outside, and waypoints that settle but have no bounds.
     """
     prediction, bounds = bounds_on(rover, terrain, poses, **arguments)
     rows, outside = bounds.bounded, 0
     limits = {name: getattr(bounds, name)[rows] for name in BOUNDED_VALUES}
-    drawn: dict[str, list[np.ndarray]] = {name: [] for name in BOUNDED_VALUES}
     for sample in draw_maps(terrain, length, count, seed):
         swept = judge_path(rover, sample, poses, SweepOptions(**arguments))[0]
         beyond = ~swept.settled[rows]
@@ -107,21 +100,16 @@ def draw_path(rover, terrain, poses, length, count, seed, **arguments):
             value = getattr(swept, name)[rows]
             left = (value < limit[..., 0] - ROUNDING) | (value > limit[..., 1] + ROUNDING)
             beyond |= left.reshape(len(left), -1).any(axis=1)
-            drawn[name].append(value)
         outside += int(beyond.sum())
-    counts = rows.sum() * count, outside, (prediction.settled & ~rows).sum()
-    with np.errstate(invalid="ignore", divide="ignore"):
-        widths = {
-            name: np.ptp(limits[name], axis=-1) / np.ptp(drawn[name], axis=0)
-            for name in BOUNDED_VALUES
-        }
-    return np.array(counts), widths
+    return np.array([rows.sum() * count, outside, (prediction.settled & ~rows).sum()])
 
 
 @pytest.mark.parametrize(
     ("rover", "ground", "paths", "count"),
     [
         (LSR1, "relief", "straight", 1),
+        (LSR1, "rocks", "straight", 1),
+        (LSR1, "relief", "arcs", 1),
         *[
             pytest.param(*case, marks=pytest.mark.long)
             for rover, ground in product((LSR1, M2020), GROUNDS)
@@ -136,7 +124,7 @@ def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground, paths, c
     cases = [(0.0, 0.005), (rover.wheel.radius, 0.003), (0.0, 0.001), (0.8, 0.005)]
     terrain = GROUNDS[ground](rover)
     waypoints, outside, unbounded = sum(
-        draw_path(rover, with_std(terrain, std), make(seed), length, 8, seed, policy=policy)[0]
+        draw_path(rover, with_std(terrain, std), make(seed), length, 8, seed, policy=policy)
         for seed, (length, std) in enumerate(cases[:count])
         for policy in ("equal", "optimal")
     )
@@ -144,33 +132,6 @@ def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground, paths, c
         assert waypoints > 375 * count and unbounded <= 0.03 * len(PATH) * 8
     assert waypoints > 150 * count
     assert outside <= np.ceil(bdtrik(0.95, waypoints, 1e-3))
-
-
-@pytest.mark.parametrize("length", [0.1, 0.8])
-def test_bounds_are_of_the_size_of_what_happens(length):
-    """Not infinitely wide: that would be conservative, too."""
-    _, widths = draw_path(LSR1, with_std(fractal(2), 0.003), PATH, length, 10, 1)
-    widest = {0.1: 8.0, 0.8: 40.0}[length]
-    for name in ("roll", "pitch", "friction_utilisation", "torque_saturation"):
-        assert 1.0 < np.median(widths[name]) < widest, name
-
-
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-@pytest.mark.parametrize(
-    ("terrain", "poses"),
-    [(rocky(3), PATH), (fractal(2), PATH), (step(0.05), PATH), (fractal(2), arc_across(1, 1.0))],
-    ids=["rocks", "relief", "step", "arc"],
-)
-def test_bounds_hold_the_prediction(terrain, poses, policy):
-    prediction, bounds = bounds_on(LSR1, with_std(terrain, 0.002), poses, policy=policy)
-    assert bounds.bounded.sum() >= len(poses) - 1
-    assert (np.abs(prediction.steering_angle).max() > 0.3) == (poses is not PATH)
-    for name in BOUNDED_VALUES:
-        value, limits = getattr(prediction, name), getattr(bounds, name)
-        assert limits.shape == (*value.shape, 2)
-        rows = bounds.bounded
-        assert np.all(limits[rows, ..., 0] <= value[rows]), name
-        assert np.all(limits[rows, ..., 1] >= value[rows]), name
 
 
 @pytest.mark.parametrize(("rover", "terrain"), [(LSR1, fractal(2)), (M2020, SLOPE)])
@@ -225,17 +186,6 @@ def test_the_verdict_is_never_less_cautious(seed, std, sigmas, rough, policy):
         assert cautious.tilt_bound >= nominal.max_tilt - 1e-9 or not all(prediction.bounds.bounded)
 
 
-def test_a_limit_that_may_be_broken_is_refused_and_says_so():
-    terrain = with_std(plane(0.0, 0.0, half=3.0), 0.004)
-    slippery = judge_path(LSR1, terrain, PATH, SweepOptions(friction=0.3))[1]
-    assert not slippery.traversable
-    assert slippery.code == "friction"
-    assert "slips: friction utilisation" in slippery.reason
-    assert slippery.reason.endswith("limit 1.00, at worst within 3 sigma of the map")
-    assert slippery.friction_utilisation_bound > 1.0 > slippery.max_friction_utilisation
-    assert judge_path(LSR1, terrain, PATH, SweepOptions(friction=0.3), sigmas=0.5)[1].traversable
-
-
 def limited(**limits) -> Rover:
     return replace(LSR1, limits=replace(LSR1.limits, **limits))
 
@@ -246,6 +196,7 @@ STIFF = replace(LSR1, suspension=replace(LSR1.suspension, bogie_limits=(-0.02, 0
 @pytest.mark.parametrize(
     ("rover", "code"),
     [
+        (replace(LSR1, friction=0.3), "friction"),
         (limited(tilt=0.03), "tilt"),
         (limited(belly_clearance=0.22), "belly"),
         (limited(tip_over_ratio=0.97), "tip_over"),
@@ -253,11 +204,14 @@ STIFF = replace(LSR1, suspension=replace(LSR1.suspension, bogie_limits=(-0.02, 0
         (STIFF, "suspension"),
     ],
 )
-def test_each_limit_is_held_against_its_bound(rover, code):
+def test_each_limit_is_held_against_its_bound_and_the_refusal_says_so(rover, code):
     ground = plane(0.0, 0.0, half=3.0)
+    uncertain = with_std(ground, 0.004)
     assert judge_path(rover, ground, PATH)[1].traversable
-    verdict = judge_path(rover, with_std(ground, 0.004), PATH)[1]
+    assert judge_path(rover, uncertain, PATH, sigmas=0.2)[1].traversable
+    verdict = judge_path(rover, uncertain, PATH)[1]
     assert (verdict.code, set(verdict.codes)) == (code, {code})
+    assert verdict.reason.endswith("at worst within 3 sigma of the map")
 
 
 def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
@@ -303,30 +257,19 @@ def test_a_map_without_the_layer_or_sigmas_has_no_bounds():
             judge_path(LSR1, certain, PATH, sigmas=sigmas)
 
 
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_soil_and_its_sinkage_are_bounded(policy):
-    terrain = with_std(fractal(2, roughness=0.03), 0.001)
-    on_soil = {"soil": "dry_sand", "policy": policy}
-    prediction, bounds = bounds_on(LSR1, terrain, **on_soil)
-    assert bounds.bounded.all()
-    assert np.all(bounds.sinkage[..., 1] > prediction.sinkage)
-    assert np.all(bounds.friction_utilisation[..., 1] > prediction.friction_utilisation)
-    assert draw_path(LSR1, terrain, PATH, 0.0, 2, 0, **on_soil)[0][1] == 0
-
-
-def test_best_torques_on_soil_sink_no_wheel_deeper_than_its_bound():
-    """Equal torques, with which the other bounds are found, load the wheels otherwise."""
-    ground, on_soil = with_std(rocky(3), 0.0005), {"soil": "lunar_nominal", "policy": "optimal"}
-    assert draw_path(LSR1, ground, PATH, 0.0, 2, 0, **on_soil)[0][1] == 0
-
-
-def test_the_worst_friction_within_reach_counts():
-    terrain = with_std(plane(0.2, 0.0, half=3.0), 0.003)
-    patchy = np.full(terrain.elevation.shape, 0.8)
-    patchy[:, ::2] = 0.4
-    sure = bounds_on(LSR1, terrain)[1].friction_utilisation[..., 1]
-    mixed = bounds_on(LSR1, replace(terrain, friction=patchy))[1].friction_utilisation[..., 1]
-    np.testing.assert_allclose(mixed, 2.0 * sure, rtol=1e-6)
+@pytest.mark.parametrize(
+    ("ground", "std", "soil", "policy"),
+    [
+        (fractal(2, roughness=0.03), 0.001, "dry_sand", "equal"),
+        (fractal(2, roughness=0.03), 0.001, "dry_sand", "optimal"),
+        (rocky(3), 0.0005, "lunar_nominal", "optimal"),  # equal torques load wheels otherwise
+    ],
+)
+def test_soil_and_its_sinkage_are_bounded(ground, std, soil, policy):
+    waypoints, outside, _ = draw_path(
+        LSR1, with_std(ground, std), PATH, 0.0, 2, 0, soil=soil, policy=policy
+    )
+    assert waypoints > 40 and outside == 0
 
 
 def test_ground_beside_a_wheel_counts_where_the_wheel_may_move_sideways():
@@ -340,13 +283,3 @@ def test_ground_beside_a_wheel_counts_where_the_wheel_may_move_sideways():
     _, bounds = bounds_on(LSR1, replace(terrain, friction=slippery), poses)
     right, left = np.split(bounds.friction_utilisation[0, :, 1], 2)
     np.testing.assert_allclose(left, 2.0 * right, rtol=0.05)
-
-
-def test_an_uncertain_map_is_packed_without_copies_of_its_ends():
-    ground = with_std(plane(0.2, 0.1, half=8.0), 0.01)
-    forget_terrains()
-    tracemalloc.start()
-    prepare_bounds(ground, 3.0)
-    most = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert most < 6.0 * ground.elevation.nbytes  # three of them are the ends and the errors

@@ -117,17 +117,12 @@ def test_optimal_torques_give_way_to_a_wheel_that_has_less():
     assert found.max_torque_saturation > 0.99 and found.failure_chance == 0.0
 
 
-def rising(x, y):
-    """Return the height of a slope that gets steeper: contact angles differ by 0.2 rad."""
-    return 0.12 * x**2 + 0.25 * x
-
-
 @pytest.mark.parametrize(
     ("ground", "name", "share"),
     [
         (plane(0.2, 0.0), "max_torque", 1.0),
         (plane(0.2, 0.0), "model", EVEN_SHARE),
-        (make_terrain(rising, half=3.0), "model", 1.0),
+        (make_terrain(lambda x, y: 0.12 * x**2 + 0.25 * x, half=3.0), "model", 1.0),
     ],
 )
 def test_the_torque_limit_counts_and_of_the_error_of_the_model_a_share_on_even_ground(

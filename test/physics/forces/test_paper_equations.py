@@ -3,7 +3,7 @@
 
 The paper: Hacot, Dubowsky and Bidaud, "Analysis and Simulation of a Rocker-Bogie Exploration
 Rover". Misprints are mended as docs/physics.md lists them. (2), a wheel on the ground, is in
-test_rough_poses.py; (8) to (15), in 3-D and with all weights, are the nine sums of
+test_settling.py; (8) to (15), in 3-D and with all weights, are the nine sums of
 test_equilibrium.py.
 """
 

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policy "servo" on firm ground and on soil: the nine equations hold, and rovers do as they must.
-
-That mirrored grounds have mirrored answers is in test_symmetries.py.
-"""
+"""Policy "servo" on firm ground and on soil: nine equations hold, and rovers do as they must."""
 
 from dataclasses import replace
 
@@ -16,7 +13,6 @@ from rover_physics import SweepOptions, judge_path, judge_poses
 from rover_physics.forces import soil as soil_model
 from rover_physics.forces.servo_balance import write_residual
 from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
-from rover_physics.forces.servo_search import CREEP
 from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import S, T, roll_wheel
 from rover_physics.numerics.records import new_record
@@ -35,7 +31,6 @@ SOFT = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
 SAND = replace(SERVO, soil="lete_sand", max_torque=20.0)
 POSE = np.zeros((1, 3))
 soils = st.sampled_from(SOFT)
-few = settings(max_examples=12)
 
 
 def with_droop(rover, droop):
@@ -94,18 +89,6 @@ def test_the_jacobian_is_that_of_finite_differences(ground, half, options, apart
         np.testing.assert_allclose(J, found, atol=apart * np.abs(found).max())
 
 
-@pytest.mark.parametrize(("rover", "slope"), [(LSR1, 0.1), (LSR1, 0.3), (M2020, 0.2)])
-def test_uphill_the_speed_lost_is_that_of_droop_and_creep(rover, slope):
-    ground = plane(slope, 0.0, half=4.0)
-    found = judge_path(with_droop(rover, 0.3), ground, POSE, SERVO)[0]
-    saturation = found.torque_saturation[0].mean()
-    assert 1.0 - found.speed_share[0] == pytest.approx(0.3 * saturation, abs=0.03)
-    stiff = judge_path(with_droop(rover, 0.0), ground, POSE, SERVO)[0]
-    assert 1.0 - stiff.speed_share[0] <= 3.0 * CREEP
-    weight_along = rover.weight * np.sin(np.arctan(slope))
-    assert found.tangential.sum() == pytest.approx(weight_along, rel=1e-5)
-
-
 @pytest.mark.parametrize("slope", [0.25, -0.25])
 def test_what_is_missing_is_the_weight_along_the_slope_less_what_the_motors_give(slope):
     """Uphill it is missing to drive, downhill to brake."""
@@ -115,17 +98,6 @@ def test_what_is_missing_is_the_weight_along_the_slope_less_what_the_motors_give
     expected = np.sign(slope) * (np.sin(np.arctan(abs(slope))) - motors)
     assert found.results["deficit"][0] == pytest.approx(expected, rel=1e-3)
     assert found.stalls[0] == (Stall.STALLED if slope > 0.0 else Stall.RUNS_AWAY)
-
-
-@pytest.mark.parametrize("curvature", [0.5, 1.0])
-def test_on_an_arc_motors_work_against_friction_at_the_rims(curvature):
-    """A wheel that stands on its rims scrubs with mu N half a width from its middle."""
-    half = 0.5 * LSR1.wheel.width
-    found, _ = judge_poses(LSR1, plane(0.0, 0.0), POSE, np.array([curvature]), SERVO)
-    work = float(np.sum(found.torque * found.wheel_speed))
-    gripped = half * curvature / np.hypot(half * curvature, CREEP)
-    scrub = LSR1.friction * gripped * LSR1.weight * half * found.motion[0, 2]
-    assert work == pytest.approx(scrub, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -153,20 +125,18 @@ def test_energy_and_time_count_slip_and_droop(slope, soil):
         for policy in ("servo", "equal")
     )
     assert servo.time[-1] == pytest.approx(equal.time[-1] / servo.speed_share[0], rel=1e-3)
-    if soil is None:  # without loss, the work is that of the weight; slip adds a little
-        assert 1.0 <= servo.energy[-1] / (LSR1.weight * slope * 0.6) <= 1.06
-    else:  # the rims turn farther than the rover goes: energy is torque times that distance
-        distance = np.hypot(0.6, 0.6 * slope) / (1.0 - servo.slip_ratio[0])
-        work = (servo.torque[0] / LSR1.wheel.radius * distance).sum()
-        assert servo.energy[-1] == pytest.approx(work, rel=0.02)
-        thrust = servo.tangential + servo.motion_resistance
-        np.testing.assert_allclose(servo.torque, LSR1.wheel.radius * thrust, rtol=1e-9)
+    # The rims turn farther than the rover goes: energy is torque times that distance.
+    distance = np.hypot(0.6, 0.6 * slope) / (1.0 - servo.slip_ratio[0])
+    work = (servo.torque[0] / LSR1.wheel.radius * distance).sum()
+    assert servo.energy[-1] == pytest.approx(work, rel=0.02)
+    thrust = servo.tangential + servo.motion_resistance
+    np.testing.assert_allclose(servo.torque, LSR1.wheel.radius * thrust, rtol=1e-9)
     # The servo's droop gives the rim's speed, and the slip what is left of it.
     rim = 1.0 - LSR1.wheel.servo_droop * servo.torque[0] / LSR1.wheel.max_torque
     assert rim * (1.0 - servo.slip_ratio[0]) == pytest.approx(servo.speed_share[0], abs=0.02)
 
 
-@few
+@settings(max_examples=12)
 @given(soils, st.floats(0.02, 0.4))
 def test_a_rover_drives_where_its_wheels_can_pull_and_slides_where_they_cannot(soil, slope):
     options = replace(SERVO, soil=soil, max_torque=1e4)

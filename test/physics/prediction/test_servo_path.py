@@ -11,7 +11,7 @@ from support.grounds import make_terrain
 from support.paths import arc_of, poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import fractal, plane
-from support.rovers import FIXED, LSR1
+from support.rovers import LSR1
 
 ROVER = unlimited(LSR1)
 SERVO = SweepOptions(policy="servo")
@@ -75,17 +75,6 @@ def test_a_rover_that_its_motors_cannot_hold_runs_away_on_a_long_slope_alone():
     short, long = (judge_path(ROVER, ground, drive_path()[:n], options) for n in (8, 40))
     assert short[1].traversable and (np.diff(short[0].speed_share) > 0.0).all()
     assert "runs away" in long[1].reason
-
-
-def test_a_rover_that_cannot_steer_turns_off_an_arc_and_one_that_can_does_not():
-    flat = plane(0.0, 0.0, half=2.0)
-    path = arc_of(0.6, np.linspace(0.0, 1.2, 61))
-    skidding, refused = judge_path(FIXED, flat, path, SERVO)
-    drift = skidding.drift[:, 0]
-    assert drift[-1] > 0.2 and (np.diff(drift[:40]) >= -1e-9).all()
-    assert "turns off its path" in refused.reason
-    steered, verdict = judge_path(LSR1, flat, path, SERVO)
-    assert steered.drift.max() < 0.02 and verdict.traversable
 
 
 def test_a_higher_step_costs_more_energy_hardly_depending_on_the_spacing_of_waypoints():

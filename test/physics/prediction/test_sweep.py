@@ -34,9 +34,7 @@ from support.rover_geometry import place_rover
 from support.rovers import LSR1, M2020
 
 LEVEL = plane(0.0, 0.0)
-POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
-few = settings(max_examples=8)
 
 
 def line(start: float, end: float, count: int = 41) -> np.ndarray:
@@ -71,10 +69,10 @@ def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
 )
 def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
     with pytest.raises(RoverError, match=words):
-        judge_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))[0]
+        judge_path(LSR1, LEVEL, [[0.0, 0.0, 0.0]], SweepOptions(**arguments))[0]
 
 
-@few
+@settings(max_examples=8)
 @given(st.integers(0, 10_000), st.integers(1, 70))
 def test_any_choice_of_poses_gives_identical_rows(seed, count):
     ground, poses = rocky(1), random_poses(1, 70, 2.6)
@@ -106,11 +104,8 @@ def lifted(rover, prediction):
     return rover.gravity * (end - start)
 
 
-def test_uphill_time_is_that_of_the_way_and_energy_of_the_weight_lifted_and_brakes_give_none():
-    down = judge_path(LSR1, plane(-0.3, 0.0), line(-0.3, 0.3))[0]
-    assert (down.torque < 0.0).all() and down.energy[-1] == 0.0
-    up = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))[0]
-    assert up.energy[0] == 0.0 and up.energy[-1] == pytest.approx(lifted(LSR1, up), rel=1e-4)
+def test_uphill_time_is_that_of_the_way_and_distance_that_on_the_map():
+    up = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3))[0]
     assert up.time[0] == 0.0 and up.distance[-1] == pytest.approx(0.6)
     way = 0.6 * np.hypot(1.0, 0.3)
     assert up.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)

@@ -16,8 +16,6 @@ from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive, steer_w
 from rover_physics.rover.steering_joints import (
     can_turn_on_the_spot,
     check_joint_limit,
-    steered_wheels,
-    steering_joints,
     tightest_radius,
 )
 from support.rovers import ALL_STEER, FIXED, LSR1, M2020
@@ -90,14 +88,6 @@ def test_a_rover_turns_on_the_spot_if_its_wheels_reach_the_tangent():
 # Commands: the drive waits for wheels that steer
 
 
-def test_the_joints_are_those_of_the_steered_axles_in_wheel_order():
-    assert steering_joints(LSR1) == (
-        "rear_right_steering", "front_right_steering", "rear_left_steering", "front_left_steering",
-    )  # fmt: skip
-    assert steered_wheels(LSR1).tolist() == [0, 2, 3, 5]
-    assert steering_joints(FIXED) == ()
-
-
 def test_a_motion_beyond_the_limit_is_refused_by_wheel_and_angle():
     narrow = with_limit(LSR1, 0.4)
     aims = SteeredDrive(narrow).aim(0.0, 0.1)
@@ -119,10 +109,7 @@ def test_wheels_turn_at_their_rate_and_the_drive_waits_for_them():
     assert moving[0] == pytest.approx(np.cos(STAND_ERROR), abs=0.01)
 
 
-def test_aims_are_those_of_the_arc_and_fixed_wheels_are_never_waited_for():
-    aims = SteeredDrive(LSR1).aim(0.06, 0.06)
-    assert aims.angles[5] == pytest.approx(np.arctan2(0.4, 1.0 - 0.31))
-    assert aims.speeds[2] == pytest.approx(0.06 * np.hypot(1.31, 0.4))
+def test_fixed_wheels_are_never_waited_for():
     drive = SteeredDrive(FIXED)
     aims = drive.aim(0.06, 0.1)
     assert not aims.angles.any() and drive.share(np.zeros(6), aims.angles) == 1.0

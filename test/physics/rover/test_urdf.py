@@ -157,7 +157,6 @@ def test_wheels_that_are_not_level_are_brought_onto_level_ground(tmp_path):
         ({"axes": {"forward": "x", "up": "z"}}, "rocker.right: y is .* on the other side"),
         ({"axes": {"forward": "x", "up": "-x"}}, "axes.up is -x; it must be across forward x"),
         ({"angles": {"PR": 0.05}}, "both sides of the rover must be alike"),
-        ({"bogie": None}, "missing key bogie; a joint map needs"),
         ({"rover": {}}, "missing keys .* the URDF does not tell it: write it under rover: in"),
         ({"steering": {"rear_right": "WBR"}}, "steering.rear_right: joint WBR is named twice"),
         (
@@ -168,7 +167,6 @@ def test_wheels_that_are_not_level_are_brought_onto_level_ground(tmp_path):
             },
             "wheels.front_right: joint Root is floating; it must turn",
         ),
-        ({"angles": {"PR": "x"}}, "angles.PR is 'x'; it must be a number in rad"),
         (
             {"arm": {"joints": ["PR", "QR", "PL"], "tip": "t", "stowed": [0.0, 0.0, 0.0]}},
             "arm.tip: no link 't' in the URDF",
@@ -192,7 +190,6 @@ def test_a_wrong_joint_map_is_refused_with_its_key(keys, said, tmp_path):
         ),
         ('xyz="0.1 0.3 -0.5"', 'xyz="0.1 0.3"', "PR: xyz is '0.1 0.3'; it must be 3 numbers"),
         ('mass value="10.0"', 'mass value="-1"', "link Body: mass is -1"),
-        ('mass value="10.0"', 'mass value="nan"', "Body: value is 'nan'; it must be a number"),
         ('xyz="0.1 0.3 -0.5"', 'xyz="1e300 0.3 -0.5"', "PR: xyz is '1e300 0.3 -0.5'"),
         ('type="floating"', 'type="hinge"', "joint Root: type is 'hinge'"),
         ('<child link="RockerL"/>', '<child link="RockerX"/>', "'RockerX' is no link"),

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path
-from rover_physics.traversability import entrapment
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.reference_drives import drive_ground
@@ -37,15 +36,6 @@ def test_a_hole_without_way_out_is_refused_as_trapped_where_the_rover_goes_in(en
     assert verdict.codes[verdict.first_failure] == "trapped"
     if end < 0.5:
         assert "no way on" in verdict.reason and "no way back" in verdict.reason
-
-
-def test_ways_on_have_the_steps_of_the_whole_path_wherever_its_sweep_stops(monkeypatch):
-    poses, counted = poses_at(np.arange(-1.6, 1.6, 0.01)), []
-    monkeypatch.setattr(
-        entrapment, "count_steps", lambda path, *_: counted.append(len(path)) or 50
-    )
-    judge_path(DEEP_DROPS, HOLE, poses, stop_at_failure=True)
-    assert counted == [len(poses)]
 
 
 def test_traction_control_gets_out_of_what_equal_torques_and_weak_motors_are_trapped_in():

@@ -23,17 +23,11 @@ def call_old(name, *arguments, **named):
 
 
 def test_the_old_names_predict_as_the_new_ones_do_and_warn_where_they_are_called():
-    ahead, back = (
-        judge_path(LSR1, GROUND, POSES, options)[0] for options in (SweepOptions(), BACKWARD)
-    )
-    bends = np.full(len(POSES), 0.2)
-    curved = judge_poses(LSR1, GROUND, POSES, bends)[0]
-    found = [
-        (call_old("sweep_path", POSES), ahead),
+    back, bends = judge_path(LSR1, GROUND, POSES, BACKWARD)[0], np.full(len(POSES), 0.2)
+    for found, expected in (
         (call_old("sweep_path", poses=POSES, options=BACKWARD), back),
         (call_old("sweep_paths", [POSES, POSES], BACKWARD)[1], back),
-        (call_old("sweep_poses", POSES, bends), curved),
-    ]
-    for one, expected in found:
-        np.testing.assert_array_equal(one.wheel_loads, expected.wheel_loads)
-        np.testing.assert_array_equal(one.energy, expected.energy)
+        (call_old("sweep_poses", POSES, bends), judge_poses(LSR1, GROUND, POSES, bends)[0]),
+    ):
+        np.testing.assert_array_equal(found.energy, expected.energy)
+        np.testing.assert_array_equal(found.wheel_loads, expected.wheel_loads)

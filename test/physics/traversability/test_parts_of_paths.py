@@ -86,11 +86,6 @@ def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monk
         assert judge_path(ROVER, GROUND, poses, stop_at_failure=True)[1].traversable
 
 
-def inclined(slope: float) -> Terrain:
-    columns = np.arange(GROUND.elevation.shape[1]) * GROUND.resolution
-    return replace(GROUND, elevation=GROUND.elevation + slope * columns)
-
-
 def steps_down(step: float) -> Terrain:
     """Return stairs down along x, 0.4 m from edge to edge, so that wheels fall again and again."""
     return make_terrain(lambda x, y: -step * np.floor(np.maximum(x + 4.0, 0.0) / 0.4), 0.04, 6.0)
@@ -102,13 +97,9 @@ def unknown(start: float) -> Terrain:
 
 
 CASES = {
-    "rocks": (GROUND, straight(-3.0), SweepOptions()),
-    "downhill": (inclined(-0.25), straight(1.0), SweepOptions(friction=0.8)),
-    "backwards down": (inclined(0.2), straight(-3.0)[::-1].copy(), SweepOptions(backward=True)),
+    "backwards": (GROUND, straight(-3.0)[::-1].copy(), SweepOptions(backward=True)),
     "slippery": (GROUND, straight(-1.0), SweepOptions(friction=0.4)),
-    "sand": (GROUND, straight(3.0), SweepOptions(soil="dry_sand")),
     "margin": (GROUND, straight(3.0), SweepOptions("optimal", control_margin=0.3, friction=0.5)),
-    "high stairs": (steps_down(0.05), straight(0.0), SweepOptions("optimal", friction=0.9)),
     "ledges": (steps_down(0.16), straight(0.0), SweepOptions()),
     "unknown ground": (unknown(8.0), straight(-3.0), SweepOptions()),
     "uncertain": (with_std(GROUND, 0.003), straight(-3.0, 2.0), SweepOptions(friction=0.7)),
@@ -212,10 +203,6 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
 
 
 GROUNDS = (bouldered, rocky, fractal)
-FRICTIONS = (0.3, 0.45, 0.6, 0.8, 1.0)
-TORQUES = (0.3, 0.6, 1.0, 2.0)
-"""Largest torques over that of the rover file, from the least on."""
-SHIFT = np.array([1234.56, -789.01, 0.0])
 
 
 def random_course(rover, seed: int) -> tuple[Terrain, np.ndarray]:
@@ -225,57 +212,17 @@ def random_course(rover, seed: int) -> tuple[Terrain, np.ndarray]:
     return scaled_for(rover, ground, straight(y, 1.0, x, yaw))
 
 
-def changes_of(rover, seed: int) -> set[str]:
-    """Return the names of the changes that the verdict of a course did not stand."""
-    terrain, path = random_course(rover, seed)
-    options = SweepOptions(friction=FRICTIONS[seed % len(FRICTIONS)])
-
-    def passes(ground=terrain, poses=path, **changes) -> bool:
-        return judge_path(rover, ground, poses, replace(options, **changes))[1].traversable
-
-    found, whole = set(), passes()
-    for name, values in (
-        ("friction", FRICTIONS),
-        ("max_torque", [share * rover.wheel.max_torque for share in TORQUES]),
-    ):
-        judged = [passes(**{name: value}) for value in values]
-        if judged != sorted(judged):
-            found.add(f"more {name}")
-    if not all(agrees_in_halves(rover, terrain, path, options)):
-        found.add("splitting")
-    place = (terrain.origin[0] + SHIFT[0], terrain.origin[1] + SHIFT[1])
-    if passes(replace(terrain, origin=place), path + SHIFT) != whole:
-        found.add("shifting")
-    middles = 0.5 * (path[1:] + path[:-1])
-    if passes(poses=np.insert(path, np.arange(1, len(path)), middles, axis=0)) != whole:
-        found.add("refining")
-    return found
-
-
-def agrees_in_halves(rover, terrain, path, options):
-    """Yield whether the two halves agree with the whole, split at waypoints that pass.
-
-    "trapped" is not compared: the end of a half is another place, from which the other half may be
-    the way on.
-    """
-    prediction, verdict = judge_path(rover, terrain, path, options)
-    passing = np.array([not reason for reason in verdict.reasons])
-    passing &= ~prediction.falling.any(axis=1)
-    for row in (len(path) // 3, len(path) // 2, 2 * len(path) // 3):
-        if passing[row]:
-            halves = path[: row + 1], path[row:]
-            parts = [judge_path(rover, terrain, half, options)[1] for half in halves]
-            if "trapped" not in {verdict.code, *(part.code for part in parts)}:
-                yield all(part.traversable for part in parts) == verdict.traversable
-
-
-@pytest.mark.parametrize("name, seed", [("lsr1", 4), ("m2020", 78)])
-def test_more_friction_or_torque_splitting_or_shifting_never_makes_a_verdict_worse(name, seed):
-    """Peaks of forces between waypoints are found to a few per cent of a limit."""
-    assert changes_of(load_rover(name), seed) <= {"refining"}
-
-
-@pytest.mark.parametrize("name, seed", [("lsr1", 34), ("lsr1", 830), ("m2020", 230)])
-def test_twice_as_many_waypoints_change_no_verdict(name, seed):
+@pytest.mark.parametrize(
+    ("name", "seed", "friction"), [("lsr1", 34, 1.0), ("lsr1", 830, 0.3), ("m2020", 230, 0.3)]
+)
+def test_twice_as_many_waypoints_change_no_verdict(name, seed, friction):
     """Each of them hid a peak of friction, or the begin of a fall, between its waypoints."""
-    assert not changes_of(load_rover(name), seed)
+    rover = load_rover(name)
+    terrain, path = random_course(rover, seed)
+    middles = 0.5 * (path[1:] + path[:-1])
+    refined = np.insert(path, np.arange(1, len(path)), middles, axis=0)
+    coarse, fine = (
+        judge_path(rover, terrain, poses, SweepOptions(friction=friction))[1]
+        for poses in (path, refined)
+    )
+    assert coarse.traversable == fine.traversable

@@ -47,6 +47,8 @@ def with_status(prediction, row, status):
         ("wheel_lift", "wheel_loads", (3,), -0.25, ["rear_left", "-0.25 N", "equal"]),
         ("friction", "friction_utilisation", (2,), 1.25, ["front_right", "1.25", "1.00"]),
         ("torque", "torque_saturation", (4,), 1.5, ["middle_left", "1.50", "1.00"]),
+        ("sinkage", "sinkage", (1,), 0.04, ["middle_right wheel sinks deeper", "0.033 m"]),
+        ("wheel_drop", "wheel_drop", (5,), 0.11, ["front_left wheel drops", "0.110 m", "0.100 m"]),
         ("belly", "belly_clearance", (), 0.011, ["0.011 m", "0.020 m"]),
         ("suspension", "rocker_angle", (0,), 0.61, ["right rocker", "0.61", "0.60"]),
         ("suspension", "bogie_angle", (0,), -0.95, ["right bogie", "-0.95", "-0.90"]),

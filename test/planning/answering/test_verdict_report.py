@@ -63,14 +63,6 @@ def test_the_report_says_what_the_model_found(full):
     assert told["goal"] == [2.0, 0.0, 0.0] and told["candidates"] == 2
 
 
-def test_a_refused_candidate_ends_at_its_failure_until_the_judgement_is_complete(full):
-    first, whole = full.candidate, full.complete().candidate
-    failure = first.verdict.first_failure
-    assert len(first.prediction.poses) == failure + 1 < len(first.poses)
-    assert len(whole.prediction.poses) == len(whole.poses) == len(first.poses)
-    assert (whole.verdict.first_failure, whole.verdict.reason) == (failure, full.reason)
-
-
 def test_without_time_for_the_rest_the_report_ends_at_the_failure(full, monkeypatch):
     def no_time(_poses):
         raise QuestionStoppedError("too_slow", "no time is left")

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from rover_physics import Terrain
-from rover_physics.results.record import RESULT
 from rover_planner.planning.path_query import PathQueryOptions, check_path
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.query import SearchQuery
 from support.grounds import make_terrain, waves
+from support.predictions import assert_same
 from support.rough_grounds import rocky
 from support.rovers import LSR1
 
@@ -46,8 +46,6 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
         judge = PathJudge(LSR1, ground, options, None, query.marked, *memory.recall_poses(query))
         part, whole = judge.check(WAY), check_path(LSR1, ground, WAY, options)
         assert part.verdict == whole.verdict
-        one, other = part.prediction, whole.prediction
-        for name in RESULT.names:
-            np.testing.assert_array_equal(one.results[name], other.results[name])
-            np.testing.assert_array_equal(one.between.results[name], other.between.results[name])
+        assert_same(part.prediction, whole.prediction)
+        assert_same(part.prediction.between, whole.prediction.between)
         ground = change_at_random(ground, rng)

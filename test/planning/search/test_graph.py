@@ -6,9 +6,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from rover_physics import load_rover
-from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty, difficulty_of
+from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty
 from rover_planner.planning.search.edges import FAILS, PASSES, Edges
-from rover_planner.planning.search.graph import PRICE, Seeds, ShortestPaths
+from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.primitives import make_primitives
 
@@ -18,7 +18,7 @@ EDGES = Edges(NODES, PRIMITIVES)
 
 
 def random_knowledge(seed):
-    """Return edges of which half is judged, some refused, and nodes with doubts."""
+    """Return edges of which half is judged, some refused, doubts of nodes, and hard ground."""
     rng = np.random.default_rng(seed)
     known = Edges(NODES, PRIMITIVES)
     judged = rng.random(known.state.shape) < 0.5
@@ -26,28 +26,12 @@ def random_knowledge(seed):
     least = np.tile(EDGES.least_cost, (EDGES.nodes.count // 16, 1))
     known.cost[:] = np.where(np.isfinite(least), least, 0.0) * (1.0 + rng.random(least.shape))
     known.standing[rng.random(EDGES.nodes.count) < 0.3] = FAILS
-    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness(rng)
-
-
-def hardness(rng):
-    """Return ground with random difficulties."""
     steps = rng.integers(0, 255, (16, 5, 6), np.uint8)
     slopes = np.zeros((2, 5, 6), np.float32)
     level = (*slopes, np.zeros((16, 6, 2), np.int64), np.zeros((16, 2)), 1.0)
     unseen = np.full(EDGES.state.shape, NOT_LOOKED, np.uint8)
-    return Difficulty(*level, steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples, unseen)
-
-
-def cost_of(graph, node, k, end):
-    """Return the cost of an edge that is not refused."""
-    least = graph.least_cost[node % 16, k]
-    if graph.state[node, k] == PASSES:
-        return graph.cost[node, k]
-    if graph.caution == 0.0:
-        return least
-    difficulty = difficulty_of(graph.difficulty, graph.columns, node, k)
-    dear = PRICE * graph.difficulty.cell * difficulty
-    return least + graph.caution * (least * graph.doubt[end] + dear)
+    hardness = Difficulty(*level, steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples, unseen)
+    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness
 
 
 def explicit_costs(known, graph):
@@ -62,7 +46,7 @@ def explicit_costs(known, graph):
                 continue
             end = (y * shape[1] + x) * 16 + primitive.end_heading
             if known.state[node, k] < FAILS and known.standing[end] < FAILS:
-                cost = cost_of(graph, node, k, end)
+                cost = edge_cost(graph, node, k, end)
                 best[node, end] = min(cost, best.get((node, end), np.inf))
     ends = np.array(list(best), int).reshape(-1, 2)
     return csr_array((list(best.values()), tuple(ends.T)), shape=2 * (EDGES.nodes.count,))
@@ -90,46 +74,3 @@ def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
         np.testing.assert_array_equal(ends[:-1], firsts[1:])
         assert firsts[0] == starts.nodes[route.start] and ends[-1] == goals.nodes[route.goal]
     assert found > 0
-
-
-def learn_of(route, known, search, rng):
-    """Judge edges of a route, none below its estimate, refuse and doubt nodes beside; note it."""
-    graph = search.graph(1.0)
-    judged = route.edges[rng.random(len(route.edges)) < 0.5]
-    ends = EDGES.ends(judged)
-    for edge, end in zip(judged, ends, strict=True):
-        estimate = cost_of(graph, *divmod(edge, EDGES.width), end)
-        known.cost.flat[edge] = estimate * (1.0 + 0.2 * rng.random())
-        known.state.flat[edge] = rng.choice([PASSES, PASSES, FAILS])
-    beside = NODES.around(EDGES.ends(route.edges))
-    refused, doubted = rng.choice(beside, 6), rng.choice(beside, 30)
-    known.standing[refused] = FAILS
-    graph.doubt[doubted] += 0.3
-    for nodes in (ends, refused, doubted):
-        search.note(nodes)
-
-
-def test_a_search_goes_on_after_all_that_is_learned_as_one_from_scratch():
-    steps = 0
-    for seed in range(8):
-        known, rng = Edges(NODES, PRIMITIVES), np.random.default_rng(seed)
-        estimates = np.zeros(NODES.count, np.float32), hardness(rng)
-        starts, goals = (
-            Seeds(np.array(nodes), rng.random(2)) for nodes in ([16 * 14, 16 * 15], [16 * 60, 16])
-        )
-        search = ShortestPaths(known, *estimates, starts)
-        for caution in [0.0] * 12 + [1.0] * 28:
-            route = search.find(starts, goals, caution)
-            fresh = ShortestPaths(known, *estimates, starts)
-            fresh.find(starts, goals, 0.0)  # the first costs to the goal would be guesses
-            best = fresh.find(starts, goals, caution)
-            if best is None:
-                assert route is None
-                break
-            assert abs(route.cost - best.cost) < 1e-9
-            learn_of(route, known, search, rng)
-            if rng.random() < 0.1:
-                starts.costs[route.start] += 0.2 * rng.random()
-                goals.costs[route.goal] += 0.2 * rng.random()
-            steps += 1
-    assert steps > 100

@@ -24,6 +24,7 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import START_REFUSED, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
+from support.paths import poses_at
 from support.rough_grounds import plane
 from support.services import make_service
 
@@ -36,24 +37,20 @@ def service():
     return make_service(plane(0.0, 0.0, half=4.0), planner=AUTO, search_budget=60.0)
 
 
-def straight(first: float, last: float) -> np.ndarray:
-    x = np.linspace(first, last, 40)
-    return np.column_stack([x, 0.0 * x, 0.0 * x])
-
-
 def test_an_answer_leads_around_a_marked_place_until_it_is_cleared(service):
     service.mark(PLACE)
     judged = service.snapshot().answer(START, GOAL)
     assert judged.traversable, judged.reason
     away = np.hypot(judged.candidate.poses[:, 0] - PLACE.x, judged.candidate.poses[:, 1])
     assert away.min() >= PLACE.radius
+    assert judged.candidate.verdict.failure_chance == 0.0  # it is asked of this path, too
     service.marked = NONE_MARKED
     assert np.abs(service.snapshot().answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
 
 
 def test_a_path_into_a_marked_place_is_refused_with_reason_and_date(service):
     service.mark(PLACE)
-    service.given_path = GivenPath(straight(0.0, 3.0), "")
+    service.given_path = GivenPath(poses_at(np.linspace(0.0, 3.0, 40)), "")
     judged = service.snapshot().check_path()
     assert judged.code == MARKED_CODE
     assert PLACE.reason in judged.reason and PLACE.date in judged.reason
@@ -72,7 +69,8 @@ def test_a_goal_in_a_marked_place_is_answered_with_one_near_it(service):
 
 def test_a_rover_may_leave_a_place_but_not_go_on_into_it():
     marked = MarkedPlaces((PLACE,))
-    pieces = [straight(1.3, 0.5), straight(1.3, 1.4), straight(1.6, 2.5), straight(1.3, 1.3)]
+    ends = (1.3, 0.5), (1.3, 1.4), (1.6, 2.5), (1.3, 1.3)
+    pieces = [poses_at(np.linspace(*both, 40)) for both in ends]
     assert marked.refuses(pieces).tolist() == [False, True, False, False]
 
 

@@ -20,6 +20,7 @@ from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, waves
+from support.paths import arc_of
 from support.rough_grounds import enlarged, plane, rocky
 from support.rovers import FIXED, LSR1, similar
 
@@ -290,54 +291,14 @@ def test_a_wall_hides_what_is_behind_it_unless_nothing_hides():
     assert np.isfinite(look(ground, occlusion=False).elevation_at(1.5, 0.0))
 
 
-def follow(path, start, speed=0.05, step=0.2, most=4000):
-    """Return the poses (n, 3) of a rover that follows a path, and the commands (n, 2)."""
-    follower, pose = PathFollower(path, 0.3, 0.5), np.array(start, float)
-    poses, commands = [pose.copy()], []
-    for _ in range(most):
-        v, rate = follower.steer(pose, speed)
-        if follower.has_arrived(pose):
-            return np.array(poses), np.array(commands)
-        pose += step * np.array([v * np.cos(pose[2]), v * np.sin(pose[2]), rate])
-        pose[2] = wrap(pose[2])
-        poses.append(pose.copy()), commands.append((v, rate))
-    raise AssertionError(f"did not arrive; it is at {pose}")
-
-
 def line(start, end, yaw, count=30):
     return np.column_stack([np.linspace(start, end, count), np.full(count, yaw)])
-
-
-def test_a_path_driven_backwards_is_followed_backwards_from_beside_it():
-    yaw = 2.0
-    heading = np.array([np.cos(yaw), np.sin(yaw)])
-    aside = 0.1 * np.array([-heading[1], heading[0]])
-    poses, commands = follow(line((0.0, 0.0), -2.0 * heading, yaw), [*aside, yaw])
-    assert (commands[:-1, 0] < 0.0).all()
-    assert np.hypot(*(poses[-1, :2] + 2.0 * heading)) < 0.1
-    assert abs(aside @ poses[-1, :2]) < 0.1 * 0.03
-
-
-def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
-    back = np.array([1.0, 0.0, 0.0]) + arc(-1.0, 0.8)  # to the right
-    path = np.vstack([line((0.0, 0.0), (1.0, 0.0), 0.0), back[1:]])
-    poses, commands = follow(path, (0.0, 0.0, 0.0))
-    gears = np.sign(commands[:, 0])
-    assert np.count_nonzero(np.diff(gears)) == 1 and gears[0] > 0.0 > gears[-1]
-    assert poses[:, 0].max() == pytest.approx(1.0, abs=0.08)
-    assert np.hypot(*(poses[-1, :2] - path[-1, :2])) < 0.1
 
 
 # Wheels that steer
 
 LOOK_AHEAD = 0.4
 REACH = float(np.hypot(0.4, 0.31))
-
-
-def arc(radius, angle):
-    turned = np.linspace(0.0, angle, 100)
-    x, y = radius * np.sin(turned), radius * (1.0 - np.cos(turned))
-    return np.column_stack([x, y, turned])
 
 
 def turn_and_go(angle, length):
@@ -361,7 +322,7 @@ def drive_along(plant, path):
 @pytest.mark.parametrize(("engine", "side"), [(QuasiStaticPlant, 1.0), (MujocoRover, -1.0)])
 def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
     plant = engine(LSR1, LEVEL, (0.0, 0.0, 0.0))
-    path = arc(side * 1.2, side * 0.6)
+    path = arc_of(side / 1.2, np.linspace(0.0, 0.72, 100))
     away, poses, states = drive_along(plant, path)
     assert away < 0.02
     assert poses[-1][:2] == pytest.approx(path[-1, :2], abs=0.25 * LOOK_AHEAD + 0.01)
@@ -373,13 +334,14 @@ def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
         assert at[front] == pytest.approx(-at[front.replace("front", "rear")], abs=0.02)
 
 
-def test_a_turn_on_the_spot_stays_there_and_the_drive_goes_on():
-    plant = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0))
-    away, poses, _ = drive_along(plant, turn_and_go(0.5, 0.2))
+def test_a_turn_on_the_spot_goes_the_way_of_the_path_stays_there_and_the_drive_goes_on():
+    plant, path = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0)), turn_and_go(4.0, 0.2)
+    path[:, 2] = wrap(path[:, 2])  # more than half a circle
+    away, poses, _ = drive_along(plant, path)
     assert away < 0.03
-    turning = poses[poses[:, 2] < 0.4]
-    assert np.abs(turning[:, :2]).max() < 0.02
-    assert poses[-1][2] == pytest.approx(0.5, abs=0.03)
+    turned = np.unwrap(poses[:, 2])
+    assert (np.diff(turned) > -1e-3).all() and turned[-1] == pytest.approx(4.0, abs=0.03)
+    assert np.abs(poses[turned < 3.9, :2]).max() < 0.02
 
 
 @ENGINES
@@ -400,11 +362,16 @@ def test_fixed_wheels_have_no_steering_joints_and_skid_in_curves(engine):
     assert right > 1.5 * left
 
 
-def test_a_turn_by_more_than_half_a_circle_goes_the_way_of_the_path():
-    path = line((0.0, 0.0), (0.0, 0.0), wrap(np.linspace(0.0, 4.0, 60)), 60)
-    _, commands = follow(path, (0.0, 0.0, 0.0), SPEED, 0.1)
-    assert (commands[:, 0] == 0.0).all() and (commands[:, 1] > 0.0).all()
-    assert 0.1 * commands[:, 1].sum() == pytest.approx(4.0, abs=0.02)
+def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
+    plant = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0))
+    back = np.array([1.0, 0.0, 0.0]) + arc_of(-1.0, np.linspace(0.0, -0.8, 100))  # to the right
+    path = np.vstack([line((0.0, 0.0), (1.0, 0.0), 0.0), back[1:]])
+    away, poses, _ = drive_along(plant, path)
+    assert away < 0.1
+    corner = np.argmax(poses[:, 0])
+    assert poses[corner, 0] == pytest.approx(1.0, abs=0.08)
+    assert (np.diff(poses[:corner, 0]) >= 0.0).all() and (np.diff(poses[corner:, 0]) <= 0.0).all()
+    assert np.hypot(*(poses[-1, :2] - path[-1, :2])) < 0.1
 
 
 def test_a_rover_that_stands_while_it_steers_is_given_its_time():

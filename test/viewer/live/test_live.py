@@ -37,6 +37,7 @@ from rover_planner.viewer.live.live_state import (
     describe_learned,
     read_state,
 )
+from support.paths import poses_at
 from support.rovers import LSR1
 from support.waiting import repeat_until, wait_until
 
@@ -117,11 +118,18 @@ def test_the_energy_is_torque_times_rate_times_time(listener, talker):
     assert listener.latest().energy == pytest.approx(5 * 0.5 * 1.0 + 6 * 0.5 * 1.0 * 2.0)
 
 
-def test_estimates_of_the_controller_take_precedence_over_predictions(listener, talker):
-    loads = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
+def test_estimates_take_precedence_over_predictions_and_forces_end_with_their_source(
+    listener, talker
+):
+    life = DiagnosticArray(status=[DiagnosticStatus(message="a wheel slips")])
     talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
-    talker.odometry.publish(odometry())
-    received = []
+    talker.plans.publish(poses_path(poses_at([0.0, 1.0, 2.0]), "map"))
+    repeat_until(
+        lambda: (talker.verdict.publish(life), talker.odometry.publish(odometry())),
+        lambda: "server" in listener.latest().forces_from,
+        "predictions",
+    )
+    loads, received = np.arange(10.0, 16.0), []
 
     def is_estimated() -> bool:
         received.append(listener.latest())
@@ -129,19 +137,7 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
 
     publish_until(talker.estimated, labelled_array(loads, "wheel"), is_estimated, "the controller")
     np.testing.assert_allclose(received[-1].forces["wheel_loads"], loads)
-
-
-def test_predictions_of_a_silent_server_are_no_longer_shown(listener, talker):
-    life = DiagnosticArray(status=[DiagnosticStatus(message="a wheel slips")])
-    poses = np.column_stack([np.linspace(0.0, 2.0, 3), np.zeros((3, 2))])
-    talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
-    talker.plans.publish(poses_path(poses, "map"))
-    repeat_until(
-        lambda: (talker.verdict.publish(life), talker.odometry.publish(odometry())),
-        lambda: "server" in listener.latest().forces_from,
-        "predictions",
-    )
-    wait_until(lambda: not listener.latest().forces_from, "the server to count as silent")
+    wait_until(lambda: not listener.latest().forces_from, "both to count as silent")
     assert not listener.latest().forces and listener.latest().plan is not None
 
 
@@ -210,12 +206,9 @@ def test_a_closed_link_leaves_no_thread_and_no_context():
 
 def test_a_stream_gets_stale_and_a_result_never():
     now = time.monotonic()
-    odometry, plan, none, fresh = (
-        TopicAge(now - MAX_AGE - 22.0, True),
-        TopicAge(now - MAX_AGE - 22.0, False),
-        TopicAge(None, True),
-        TopicAge(now, True),
-    )
+    old = now - MAX_AGE - 22.0
+    odometry, plan = TopicAge(old, True), TopicAge(old, False)
+    none, fresh = TopicAge(None, True), TopicAge(now, True)
     assert [one.is_stale for one in (odometry, plan, none, fresh)] == [True, False, False, False]
     assert odometry.describe() == plan.describe() == f"{MAX_AGE + 22.0:.0f} s"
     assert none.describe() == "nothing yet"

@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-from rclpy.parameter import Parameter
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
@@ -21,19 +20,8 @@ from support.viewer.sessions import wait_patiently as wait_until
 
 pytestmark = pytest.mark.slow
 
-QUERY = write_link(
-    PageLink(
-        loaded={},
-        rover={},
-        ground="0",
-        start=(0.0, 0.0, 0.0),
-        goal=(1.0, 0.0, 0.0),
-        policy="equal",
-        soil="",
-        path=1,
-        time=0.0,
-    )
-)
+DRIVE = {"start": (0.0, 0.0, 0.0), "goal": (1.0, 0.0, 0.0), "path": 1, "time": 0.0}
+LINK = PageLink(loaded={}, rover={}, ground="0", policy="equal", soil="", **DRIVE)
 PLAN = "/lines/plan"
 LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
 
@@ -64,14 +52,12 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
     assert told("verdict")["passes"] is None and told("board") is None
     assert told("subject")["map"] == "not known yet"
     save_terrain(tmp_path / "waves.npz", make_terrain(waves))
-    values = {"terrain_file": str(tmp_path / "waves.npz"), "start_x": -1.0}
-    parameters = [Parameter(name, value=value) for name, value in values.items()]
-    simulator = RoverSimulator(context=ros.context, parameter_overrides=parameters)
-    ros.spin(simulator)
-    server = ros.spin(TraverseServer(context=ros.context))
+    ground = str(tmp_path / "waves.npz")
+    simulator = ros.start(RoverSimulator, terrain_file=ground, start_x=-1.0)
+    server = ros.start(TraverseServer)
     wait_until(lambda: "live; forces not known" in words(), "the rover")
     wait_until(lambda: told("subject")["map"] == "elevation_cloud", "the map")
-    ask(page, lambda: page.hear({"ask": "open", "query": f"?{QUERY}"}))
+    ask(page, lambda: page.hear({"ask": "open", "query": f"?{write_link(LINK)}"}))
     wait_until(lambda: "opens no links" in told("verdict")["refusal"], "the refused link")
 
     def is_answered() -> bool:
