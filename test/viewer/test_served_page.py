@@ -281,7 +281,7 @@ def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
 # Errors.
 
 
-def test_a_drawing_that_fails_is_told_and_stops_no_other_and_none_is_drawn_twice(page):
+def test_what_fails_is_told_and_stops_no_other_and_what_is_drawn_is_not_drawn_again(page):
     done, ground, rover = [], object(), object()
 
     def ask_for_four() -> None:
@@ -293,9 +293,6 @@ def test_a_drawing_that_fails_is_told_and_stops_no_other_and_none_is_drawn_twice
     ask(page, ask_for_four)
     assert done == ["paths", "rover"]
     assert "ZeroDivisionError" in page.errors.pop("the plots")
-
-
-def test_a_failed_request_is_told_until_a_request_succeeds(page):
     page.requests.put(lambda: 1 / 0)
     error = ["the last request failed", "ZeroDivisionError: division by zero"]
     wait_until(lambda: told(page, "errors") == [error], "the notice")
