@@ -12,7 +12,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import Node, SetRemap
 from launch_ros.parameter_descriptions import ParameterValue
 
 HERE = Path(__file__).absolute().parent
@@ -44,6 +44,8 @@ SHARED = {
     ),
 }
 """Default and meaning of the other arguments."""
+FRAMES = [("/tf", "tf"), ("/tf_static", "tf_static")]
+"""Topics of frames, which go into the namespace: each simulated rover has the same frames."""
 PASSED_ON = ("namespace", "use_sim_time", "respawn", "rover", "watch",
              "traverse_server_parameters", "traction_controller_parameters")  # fmt: skip
 
@@ -62,7 +64,7 @@ def generate_launch_description() -> LaunchDescription:
         name="rover_simulator",
         namespace=given["namespace"],
         parameters=[given["rover_simulator_parameters"], simulated],
-        remappings=[("diagnostics", "/diagnostics")],
+        remappings=[("diagnostics", "/diagnostics"), *FRAMES],
         output="screen",
         respawn=given["respawn"],
         respawn_delay=RESPAWN_DELAY,
@@ -72,8 +74,9 @@ def generate_launch_description() -> LaunchDescription:
         # The map is the simulator's; an included file would see the terrain_file of this one.
         launch_arguments=[("terrain_file", ""), *((name, given[name]) for name in PASSED_ON)],
     )
+    remaps = [SetRemap(*names) for names in FRAMES]
     declared = [
         DeclareLaunchArgument(name, default_value=default, description=meaning)
         for name, (default, meaning) in (ARGUMENTS | SHARED).items()
     ]
-    return LaunchDescription([*declared, simulator, GroupAction([rover])])
+    return LaunchDescription([*declared, simulator, GroupAction([*remaps, rover])])

@@ -4,7 +4,7 @@
 import numpy as np
 import scipy  # loads `optimize` where it is used: no worker of the tests waits for it
 
-from support.rover_geometry import balance_matrix, free_balance_matrix
+from support.rover_geometry import balance_matrix
 
 SIDES = 96
 """Sides of the pyramid that replaces a friction cone."""
@@ -19,11 +19,7 @@ def solve_forces(rover, prediction, i, cost, max_torque, friction_share=1.0, sha
     are s0 + s1 along the rover where `shared`, else each wheel has its own. A share of the
     friction may be used. On soil, strength and resistance are in proportion to the load.
     """
-    A, b, along = balance_matrix(rover, prediction, i)
-    sideways = np.column_stack([np.ones(6), along])
-    if not shared:
-        A, b = free_balance_matrix(rover, prediction, i)
-        sideways = np.eye(6)
+    A, b, sideways = balance_matrix(rover, prediction, i, shared)
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.zeros((6, SIDES, A.shape[1]))
     resistance = prediction.motion_resistance[i] / prediction.wheel_loads[i]

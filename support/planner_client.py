@@ -94,9 +94,9 @@ class PlannerClient(Node):
         """Publish odometry of a level pose (3,)."""
         self.send(self._odometry, odometry_at(pose, height))
 
-    def can_traverse(self, start, goal, frame="map") -> Path:
+    def can_traverse(self, start, goal) -> Path:
         """Ask for a plan between two poses (3,)."""
-        return self.plan(stamped_pose(start, frame), stamped_pose(goal, frame))
+        return self.plan(stamped_pose(start, "map"), stamped_pose(goal, "map"))
 
     def plan(self, start, goal) -> Path:
         """Ask for a plan between two PoseStamped."""
@@ -178,7 +178,7 @@ def verdict_of(message: DiagnosticArray) -> dict[str, str]:
     return {entry.key: entry.value for entry in message.status[0].values}
 
 
-def ask(client: PlannerClient, start=START, goal=GOAL, **arguments):
+def ask(client: PlannerClient, start=START, goal=GOAL):
     """Ask for a plan; return it with its verdict and results."""
-    plan, results = client.next_results(lambda: client.can_traverse(start, goal, **arguments))
+    plan, results = client.next_results(lambda: client.can_traverse(start, goal))
     return plan, verdict_of(results["verdict"]), results

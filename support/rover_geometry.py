@@ -83,17 +83,12 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
     )  # fmt: skip
 
 
-def wheel_axes(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return the axles (6, 3) of the wheels at waypoint i."""
-    return place_rover(rover, prediction, i).axles
-
-
 def contact_frames(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the unit vectors n, t, a of each wheel (6, 3, 3) from attitude and contact angle.
 
     n is the contact normal, a the wheel axis, t = a x n.
     """
-    a = wheel_axes(rover, prediction, i)
+    a = place_rover(rover, prediction, i).axles
     ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP), axis=1)[:, None]
     upward = np.cross(ahead, a)
     angle = prediction.contact_angle[i][:, None]
@@ -153,26 +148,12 @@ def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.nd
 
 
 def balance_matrix(
-    rover: Rover, prediction: PathPrediction, i: int
+    rover: Rover, prediction: PathPrediction, i: int, shared: bool = True
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return A (9, 14), b (9,) and the wheels' positions along the body (6,) [m] of waypoint i.
+    """Return A (9, 12 + k), b (9,) and the lateral shares (6, k) of waypoint i.
 
-    A @ (N, T, s0, s1) = b is its balance, with forces in units of the weight and lateral forces
-    S = s0 + s1 * position.
-    """
-    A, b = free_balance_matrix(rover, prediction, i)
-    placed = place_rover(rover, prediction, i)
-    along = (placed.wheels - placed.origin) @ placed.attitude[:, 0]
-    shares = np.column_stack([np.ones(6), along])
-    return np.hstack([A[:, :12], A[:, 12:] @ shares]), b, along
-
-
-def free_balance_matrix(
-    rover: Rover, prediction: PathPrediction, i: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (9, 18) and b (9,) of waypoint i: A @ (N, T, S) = b is its balance.
-
-    All forces are in units of the weight; each wheel has an independent lateral force S.
+    A @ (N, T, s) = b is its balance, with forces in units of the weight and lateral forces
+    S = shares @ s, which are s0 + s1 * position along the body where `shared`, else independent.
     """
     placed, frames = place_rover(rover, prediction, i), contact_frames(rover, prediction, i)
     sums = []
@@ -182,7 +163,10 @@ def free_balance_matrix(
             forces[wheel] = rover.weight * frames[wheel, kind]
             acting = _on_wheels(prediction, i, placed, forces)
             sums.append(balance_sums(rover, placed, acting))
-    return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
+    A, b = np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
+    along = (placed.wheels - placed.origin) @ placed.attitude[:, 0]
+    shares = np.column_stack([np.ones(6), along]) if shared else np.eye(6)
+    return np.hstack([A[:, :12], A[:, 12:] @ shares]), b, shares
 
 
 COARSE_ANGLES, COARSE_ACROSS = 121, 17
@@ -197,7 +181,8 @@ def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: in
     The whole width of the wheels of waypoint i is looked at, densely and at all vertices of the
     ground, then around the nearest points.
     """
-    wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
+    axles = place_rover(rover, prediction, i).axles
+    wheels = zip(prediction.wheel_centres[i], axles, strict=True)
     return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
 
 

@@ -3,7 +3,6 @@
 
 import os
 import signal
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -93,18 +92,8 @@ def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
     return survey_chunk(job, chunk)
 
 
-def refuse_one(job: SurveyJob, chunk: Index) -> ChunkReport:
-    """Report of any chunk what a task reports on a full disk."""
-    return ChunkReport(refusal="No room")
-
-
 def die_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
     """Survey a chunk as a task does, but die of one."""
     if chunk == (0, 1):
         os.kill(os.getpid(), signal.SIGKILL)
     return survey_chunk(job, chunk)
-
-
-def forget_package() -> None:
-    """Make rover_physics a module that this process, a worker, cannot import."""
-    sys.modules["rover_physics"] = None  # type: ignore[assignment]

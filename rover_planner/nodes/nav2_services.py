@@ -82,7 +82,8 @@ class Nav2Services:
             ActionServer(
                 node,
                 action,
-                "~/compute_path_to_pose",
+                # ROS 2 Jazzy remaps services and topics, but not actions.
+                node.resolve_service_name("~/compute_path_to_pose"),
                 self.finish,
                 handle_accepted_callback=self.compute,
             )

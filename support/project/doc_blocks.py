@@ -21,8 +21,6 @@ class Block:
 
     page: str
     """Path of the page from the top of the checkout."""
-    line: int
-    """Line of the page where its text begins."""
     language: str
     """Language named behind the opening backquotes."""
     text: str
@@ -32,22 +30,11 @@ class Block:
     output: str | None
     """Its printed output, where a block of text follows at once; else None."""
 
-    def __str__(self) -> str:
-        """Return page and line, as tools write them."""
-        return f"{self.page}:{self.line}"
-
 
 def read_blocks(page: Path) -> list[Block]:
     """Return the blocks of a page in sh and Python, from top to bottom."""
-    text = page.read_text(encoding="utf-8")
+    name = page.relative_to(TOP).as_posix()
     return [
-        Block(
-            page.relative_to(TOP).as_posix(),
-            text[: match.start("text")].count("\n") + 1,
-            match["language"],
-            match["text"],
-            match["not_run"] or "",
-            match["output"],
-        )
-        for match in _BLOCK.finditer(text)
+        Block(name, one["language"], one["text"], one["not_run"] or "", one["output"])
+        for one in _BLOCK.finditer(page.read_text(encoding="utf-8"))
     ]

@@ -4,9 +4,10 @@
 import contextlib
 import os
 import signal
-import time
 import uuid
 from pathlib import Path
+
+from support.waiting import wait_until
 
 _NAME = "ROVER_PLANNER_TEST_RUN"
 
@@ -15,31 +16,23 @@ class ProcessToken:
     """A mark in the environment of a process and of all that it starts."""
 
     def __init__(self) -> None:
-        self._value = str(uuid.uuid4())
-
-    @property
-    def environment(self) -> dict[str, str]:
+        self.environment = {_NAME: str(uuid.uuid4())}
         """Variables to add to the environment of the first process."""
-        return {_NAME: self._value}
 
     def find(self, module: str = "") -> list[int]:
         """Return the numbers of the processes that have a text in their command line."""
-        found = []
+        found, mark = [], f"{_NAME}={self.environment[_NAME]}".encode()
         for folder in Path("/proc").glob("[0-9]*"):
-            try:
-                environment = (folder / "environ").read_bytes().decode(errors="replace")
-                command = (folder / "cmdline").read_bytes().decode(errors="replace")
-            except OSError:
-                continue
-            if f"{_NAME}={self._value}" in environment.split("\0") and module in command:
-                found.append(int(folder.name))
+            with contextlib.suppress(OSError):
+                is_marked = mark in (folder / "environ").read_bytes().split(b"\0")
+                if is_marked and module.encode() in (folder / "cmdline").read_bytes():
+                    found.append(int(folder.name))
         return found
 
     def wait_until_gone(self, seconds: float = 10.0) -> list[int]:
         """Wait until no process is left; return those that are left in the end."""
-        deadline = time.monotonic() + seconds
-        while self.find() and time.monotonic() < deadline:
-            time.sleep(0.1)
+        with contextlib.suppress(AssertionError):
+            wait_until(lambda: not self.find(), "the end of all processes", seconds)
         return self.find()
 
     def kill(self) -> None:

@@ -13,20 +13,21 @@ from rover_planner.advice.levers import LEVERS
 from rover_planner.cli import main
 from rover_planner.planning.answering.budget import Budget
 from rover_planner.shell.run_program import EXIT_INTERRUPTED
-from support.command_line import assert_refused
+from support.command_line import assert_refused, predict_arguments
 from support.grounds import make_terrain
+from support.paths import poses_at
 
 KEYS = {
     "levers", "words", "options", "largest_use", "use_before", "chance", "extra_time",
     "extra_energy", "extra_distance", "needs_others",
 }  # fmt: skip
+PATH = poses_at(np.arange(-1.0, 1.0, 0.05))
 
 
 @pytest.fixture
 def files(tmp_path):
     save_terrain(tmp_path / "terrain.npz", make_terrain(lambda x, y: 0.3 * x))
-    s = np.arange(-1.0, 1.0, 0.05)
-    np.savez(tmp_path / "poses.npz", poses=np.column_stack([s, 0.0 * s, 0.0 * s]))
+    np.savez(tmp_path / "poses.npz", poses=PATH)
     return tmp_path
 
 
@@ -58,18 +59,12 @@ def test_each_remedy_is_what_predict_passes_with(files, capsys, monkeypatch):
     assert printed.startswith("refused: ") and "\n1. " in printed
     for remedy in advice["remedies"]:
         assert remedy.keys() >= KEYS and remedy["words"] in printed
-        for lever in remedy["levers"]:
-            assert lever.keys() == {"name", "value", "unit", "from"}
-        poses = files / "poses.npz"
-        if "poses" in remedy:
-            poses = files / "other.npz"
-            np.savez(poses, poses=np.array(remedy["poses"]))
-        out, words = files / "out.npz", options_of(remedy)
+        assert {*remedy["levers"][0]} == {"name", "value", "unit", "from"}
+        np.savez(files / "poses.npz", poses=remedy.get("poses", PATH))
+        words = options_of(remedy)
         payload = [] if "--payload" in words else ["--payload", "4"]
-        names = [str(files / "terrain.npz"), str(poses), str(out)]
-        assert main(["predict", "lsr1", *names, *words, *payload]) == 0
-        with np.load(out) as prediction:
-            assert prediction["traversable"], remedy["words"]
+        assert main([*predict_arguments(files), *words, *payload]) == 0
+        assert "waypoints, traversable" in capsys.readouterr().out, remedy["words"]
 
 
 def test_a_path_that_passes_and_one_without_time_are_answered(files, capsys, monkeypatch):

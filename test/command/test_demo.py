@@ -10,11 +10,12 @@ import threading
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, save_terrain
+from rover_physics import save_terrain
 from rover_planner.cli import main
 from rover_planner.demo import demo as demo_module
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.command_line import assert_refused
+from support.grounds import make_terrain, raised
 from support.project.checkout import TOP
 from support.project.processes import ProcessToken
 from support.rovers import LSR1
@@ -28,10 +29,8 @@ pytest.importorskip("matplotlib", reason="needs matplotlib")
 def map_file(tmp_path):
     """A small terrain of gentle ground with a corner that was never seen."""
     made = make_mars_terrain(4, 6.0, 0.1, rock_cover=0.0, crater_density=0.0)
-    elevation = made.elevation.copy()
-    elevation[40:, 40:] = np.nan
     path = tmp_path / "map.npz"
-    save_terrain(path, Terrain(elevation, made.resolution, made.origin))
+    save_terrain(path, raised(made, np.s_[40:, 40:], np.nan))
     return path
 
 
@@ -45,10 +44,8 @@ def token(monkeypatch):
 
 
 def test_the_picture_shows_the_path_that_a_server_searches_where_all_candidates_fail():
-    wall = np.zeros((81, 81))
-    wall[15:66, 39:42] = 1.0
-    ground, start, goal = Terrain(wall, 0.1, (-4.0, -4.0)), (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
-    answer = demo_module.answer_as_a_server(LSR1, ground, start, goal)
+    ground = make_terrain(lambda x, y: 1.0 * ((np.abs(x) < 0.15) & (np.abs(y) < 2.5)), 0.1)
+    answer = demo_module.answer_as_a_server(LSR1, ground, (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0))
     assert answer.traversable and np.abs(answer.chosen.poses[:, 1]).max() > 2.5
 
 

@@ -171,14 +171,6 @@ def test_a_condition_is_told_when_it_begins_and_when_it_ends(told, expected):
     assert lines == expected
 
 
-def test_one_that_flaps_is_told_once_a_second_at_most():
-    lines = Lines()
-    log = TransitionLog(lines)
-    for k in range(1000):
-        log.update("imu", "imu is nan" if k % 2 else "", "imu is back", 0.01 * k)
-    assert 2 <= len(lines) <= 10
-
-
 def test_texts_that_differ_in_numbers_are_told_once_in_a_period_and_others_at_once():
     log = RepeatLog()
     lines = [

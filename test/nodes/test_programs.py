@@ -20,7 +20,7 @@ from support.project.checkout import TOP, setup_arguments
 from support.ros_fixtures import domain_id
 from support.waiting import wait_until
 
-START = "--start=0,0,0"
+START, MUJOCO = "--start=0,0,0", ("--ros-args", "-p", "engine:=mujoco", "-p")
 MODULES = {name: importlib.import_module(f"rover_planner.nodes.{name}") for name in PROGRAMS}
 PARAMETER_FILES = TOP / "config" / "parameters"
 OF_ROS = re.compile(r"/(parameter_events|rosout|.*/(\w+_parameters?\w*|get_type_description))$")
@@ -119,6 +119,9 @@ def test_what_a_plain_installation_brings_is_known_by_its_modules():
         ("traverse_server", ["--colour", "red"], "--colour"),
         ("rover_simulator", ["terrain_file:=mars.npz"], "--ros-args -p"),
         ("rover_simulator", ["--engine", "horses"], "'horses'; it must be one of quasi_static"),
+        ("rover_simulator", ["--ros-args", "-p", "soil:=dry_snad"], "no soil 'dry_snad'"),
+        ("rover_simulator", [*MUJOCO, "soil:=dry_sand"], "soil is "),
+        ("rover_simulator", [*MUJOCO, "policy:=optimal"], "policy is "),
         ("traverse_server", ["--ros-args", "-p", "terrain_file:=/no/file.npz"], "/no/file.npz"),
         ("traction_controller", ["--ros-args", "-p", "friction"], "-p friction"),
         ("traction_controller", ["--ros-args", "-p", "use_sim_time:=1"], "expecting type 'BOOL'"),

@@ -89,7 +89,7 @@ def run_block(block: Block, folder: Path, programs: Path, token: ProcessToken) -
             timeout=LONGEST, start_new_session=True,
         )  # fmt: skip
     left = token.wait_until_gone(GRACE)
-    said = f"{block}\n{out.read_text()}\n{err.read_text()}"
+    said = f"{block.page}: {block.text}\n{out.read_text()}\n{err.read_text()}"
     assert ended.returncode == 0, said
     assert "Traceback" not in said and "[FATAL]" not in said, said
     assert not left, f"processes are left by {said}"

@@ -80,7 +80,10 @@ def test_the_simulation_is_the_rover_with_a_simulator():
         kind_of = type(specs[name].default)
         assert given[name].value_type is (float if kind_of is float else str)
         assert kind_of(defaults[name]) == specs[name].default
-    (include,) = group.given[0]
+    *remaps, include = group.given[0]
+    # Each of two rovers has its own frames, whose names are the same.
+    frames = [("/tf", "tf"), ("/tf_static", "tf_static")]
+    assert [one.given for one in remaps] == frames == simulator.remappings[1:]
     (source,) = include.given
     assert Path(source.given[0]) == TOP / "launch" / "rover.launch.py"
     passed = dict(include.launch_arguments)

@@ -21,7 +21,7 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.shell.run_program import end_as_by_ctrl_c
 from rover_planner.survey import dask_cluster
-from rover_planner.survey.chunk_survey import survey_chunk
+from rover_planner.survey.chunk_survey import ChunkReport, survey_chunk
 from rover_planner.survey.cog import write_layers
 from rover_planner.survey.dask_cluster import ClusterSettings, check_workers, open_client
 from rover_planner.survey.layout import Index
@@ -33,12 +33,10 @@ from support.survey_maps import (
     assert_same_bits,
     compute_here,
     fail_on_one,
-    forget_package,
     layers_of,
     make_request,
     make_rough_map,
     prepare_here,
-    refuse_one,
     survey_here,
 )
 from support.waiting import wait_until
@@ -109,7 +107,9 @@ def test_a_chunk_that_fails_is_named_and_the_rest_stands(tmp_path, scheduler):
     again = prepare_survey(make_request(step=4), str(tmp_path / "map.npz"), tmp_path / "out")
     assert again.chunks == [(0, 1)]
     with pytest.raises(PlanningError, match="cannot be written: No room; finished chunks are ke"):
-        run_survey(again.job, again.chunks, settings, task=refuse_one)
+        run_survey(
+            again.job, again.chunks, settings, task=lambda *_: ChunkReport(refusal="No room")
+        )
 
 
 def test_a_survey_ends_when_no_worker_is_left(tmp_path):
@@ -204,7 +204,7 @@ def test_workers_of_another_kind_are_refused(ground):
             check_workers(replace(job, version="99.0"), client, workers)
         with pytest.raises(PlanningError, match=f"does not see {elsewhere}"):
             check_workers(replace(job, store=elsewhere), client, workers)
-        client.run(forget_package)
+        client.run(exec, "import sys; sys.modules['rover_physics'] = None")
         with pytest.raises(PlanningError, match="cannot import rover_planner: "):
             check_workers(job, client, workers)
 

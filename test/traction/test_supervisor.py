@@ -57,8 +57,6 @@ def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_ena
     assert rig.run(1.0).state == "disabled"
     assert supervisor.set_enabled(True)[0]
     assert rig.run(PERIOD).state == "driving"
-    assert supervisor.set_enabled(False) == (True, "disabled")
-    assert rig.run(PERIOD).state == "disabled"
 
 
 def test_the_watch_of_the_path_holds_the_rover_and_where_it_is_expected_so_does_its_silence():

@@ -144,9 +144,11 @@ def judge():
         yield made
 
 
-def test_changes_add_up_although_the_judgements_between_are_dropped(judge):
+def test_changes_add_up_and_no_old_path_is_chosen_while_others_are_planned(judge):
     session = judge.session
     session.plan_to(np.array([1.5, 0.5]))
+    with pytest.raises(PlanningError, match="the listed paths are old"):
+        session.show_path(1)
     session.change_rover([("friction",)], 0.5)
     session.take_change(session.wanted.change_options(joint_angles={"arm_yaw": 0.3}))
     session.take_change(session.wanted.change_options(soil="dry_sand"))
@@ -164,10 +166,3 @@ def test_an_error_of_the_judgement_is_raised_and_stops_it(judge):
     with pytest.raises(ValueError, match="many"):
         judge.finish()
     assert judge.session.is_outdated and judge.session.is_stopped
-
-
-def test_a_path_of_an_old_list_is_not_chosen_while_others_are_planned(judge):
-    session = judge.session
-    session.plan_to(np.array([1.5, 0.5]))
-    with pytest.raises(PlanningError, match="the listed paths are old"):
-        session.show_path(1)

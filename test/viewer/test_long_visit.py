@@ -39,28 +39,18 @@ def change(visitor: Visitor, values: dict[str, str]) -> None:
 
 
 def take_advice(visitor: Visitor) -> None:
-    """Wait for what is found by the time that the page promises, and take the first of it."""
+    """Wait for what is found by the time that the page promises, look at it, and stop."""
     tab, remedies = visitor.tab, visitor.tab.locator("#advice li[tabindex]")
-    question, stop = (
-        tab.locator("#advice").get_by_role("button", name=name)
-        for name in ("What would help?", "Stop")
-    )
-    wait_until(lambda: not question.count(), "the search")
-    wait_until(
-        lambda: not stop.count() or "the search goes on" in visitor.text("#advice"), "the advice"
-    )
+    visitor.press("What would help?")
+    stop = tab.locator("#advice").get_by_role("button", name="Stop")
+    found = "the search goes on"
+    wait_until(lambda: remedies.count() or found in visitor.text("#advice"), "the advice")
     if remedies.count():
         remedies.first.hover()
-        remedies.first.click()
-        wait_until(lambda: visitor.text("#verdict .word") == "traversable", "its verdict")
-        wait_for_rest(visitor)
-        visitor.open_tab("Rover")
-        visitor.press("Undo")
-        wait_for_rest(visitor)
-    elif stop.count():
+    if stop.count():
         with suppress(sync_api.TimeoutError):  # it may end before it is clicked
             stop.click(timeout=5000.0)
-        wait_until(lambda: not stop.count(), "the end of the search")
+    wait_until(lambda: not stop.count(), "the end of the search")
 
 
 def click_through(visitor: Visitor) -> None:
@@ -88,7 +78,6 @@ def click_through(visitor: Visitor) -> None:
     wait_for_rest(visitor)
     if tab.get_by_role("button", name="Go to the failure").count():
         visitor.press("Go to the failure")
-        visitor.press("What would help?")
         take_advice(visitor)
     visitor.press("To the start")
     visitor.press("Play")

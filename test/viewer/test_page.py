@@ -23,6 +23,7 @@ pytestmark = [needs_browser, pytest.mark.slow]
 
 FRICTION = "friction [-]"
 NAME = "blocked.npz"
+READ_COLOURS = "all => all.map((it) => [it.innerText.split(',')[0], getComputedStyle(it).color])"
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +106,8 @@ def test_a_row_is_taken_by_click_and_key_and_a_slider_leaves_its_path_and_offers
 ):
     session, refused = page.session, find_refused(page)
     visitor.open_tab("Paths")
+    found = dict(visitor.tab.eval_on_selector_all("#paths b.mark", READ_COLOURS))
+    assert found == {"passes": "rgb(0, 114, 178)", "refused": "rgb(194, 79, 0)"}
     rows = visitor.tab.locator("#paths tr[tabindex]")
     other = refused + 1
     rows.nth(other).focus()
@@ -129,13 +132,6 @@ def test_a_row_is_taken_by_click_and_key_and_a_slider_leaves_its_path_and_offers
     wait_for_rest(page)
 
 
-def test_verdicts_of_paths_have_the_colours_of_what_passes_and_of_what_is_refused(visitor):
-    read = "all => all.map((one) => [one.innerText.split(',')[0], getComputedStyle(one).color])"
-    visitor.open_tab("Paths")
-    found = dict(visitor.tab.eval_on_selector_all("#paths b.mark", read))
-    assert found == {"passes": "rgb(0, 114, 178)", "refused": "rgb(194, 79, 0)"}
-
-
 def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, page):
     ask(page, lambda: page.session.show_path(find_refused(page)))
     wait_for_rest(page)
@@ -152,23 +148,16 @@ def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, p
     wait_until(lambda: np.allclose(camera.look_at, place, atol=1e-3), "the camera to look there")
 
 
-def test_a_number_beyond_the_ends_of_its_slider_is_where_the_slider_is(visitor, page):
-    label, session = "torque limit [N m]", page.session
-    visitor.open_tab("Rover")
-    strong = replace(LSR1, wheel=replace(LSR1.wheel, max_torque=25.0))
-    ask(page, lambda: session.take_change(replace(session.wanted, rover=strong)))
-    wait_until(lambda: visitor.box(label).input_value() == "25", "the number")
-    slider = visitor.tab.get_by_role("slider", name=label, exact=True)
-    assert float(slider.input_value()) == pytest.approx(25.0, abs=0.1)
-    ask(page, session.undo)
-    wait_for_rest(page)
-
-
 def test_a_number_of_a_slider_is_judged_and_the_reason_of_a_refused_one_stays_on_the_screen(
     visitor, page
 ):
-    session, last = page.session, "wheel [kg]"
+    session, label, last = page.session, "torque limit [N m]", "wheel [kg]"
     visitor.open_tab("Rover")
+    strong = replace(LSR1, wheel=replace(LSR1.wheel, max_torque=25.0))
+    ask(page, lambda: session.take_change(replace(session.wanted, rover=strong)))
+    wait_until(lambda: visitor.box(label).input_value() == "25", "a number beyond the ends")
+    slider = visitor.tab.get_by_role("slider", name=label, exact=True)
+    assert float(slider.input_value()) == pytest.approx(25.0, abs=0.1)
     visitor.click_share(f'input[type=range][aria-label="{FRICTION}"]', 0.25)
     quarter = pytest.approx(0.6, abs=0.06)
     wait_until(lambda: session.shown.scenario.rover.friction == quarter, "a quarter")

@@ -27,18 +27,13 @@ def walled_session(height, goal=(-1.1, 0.0, 0.0), *, ends_at_first=True):
     return session_on(ground, (-1.6, 0.0, 0.0), goal, search=search)
 
 
-def whole_wall(x, y):
-    """Return waves with a wall of 0.5 m along y at x = 0."""
-    return waves(x, y) + 0.5 * (np.abs(x) < 0.2)
-
-
 def list_steps(session: ViewSession) -> list[str | int]:
     """Return what is begun, and how many paths each result has, when all is judged."""
     steps = judge_steps(session.wanted)
     return [one.what if isinstance(one, WorkStep) else len(one.paths) for one in steps]
 
 
-def test_beyond_a_wall_with_a_gap_a_path_around_is_offered_and_the_path_looked_at_stays():
+def test_beyond_a_wall_with_a_gap_a_path_around_is_offered_and_what_is_looked_at_stays():
     session = walled_session(wall_with_gap)
     session.plan_to(BEYOND)
     shown = session.shown
@@ -49,6 +44,14 @@ def test_beyond_a_wall_with_a_gap_a_path_around_is_offered_and_the_path_looked_a
     assert offer["words"].startswith("path 6 goes around and passes")
     ends = shown.scenario.start[:2], BEYOND
     np.testing.assert_allclose(around.poses[[0, -1], :2], ends, atol=1e-9)
+    session.show_path(5)
+    for friction in (0.7, 0.75):
+        session.change_rover(FRICTION, friction)
+        assert session.shown.index == 5 and len(session.shown.paths) == 6
+        np.testing.assert_array_equal(session.shown.path.poses, around.poses)
+    session.show_path(0)
+    session.change_rover(FRICTION, 0.72)
+    assert session.shown.index == 0 and session.shown.around is not shown.around
 
 
 def test_the_first_path_around_is_shown_before_a_better_one_is_searched():
@@ -58,7 +61,7 @@ def test_the_first_path_around_is_shown_before_a_better_one_is_searched():
 
 
 def test_where_there_is_no_path_the_reason_is_told():
-    session = walled_session(whole_wall, GOAL)
+    session = walled_session(lambda x, y: waves(x, y) + 0.5 * (np.abs(x) < 0.2), GOAL)
     session.ask()
     shown = session.shown
     assert shown.around.outcome == NO_WAY and len(shown.paths) == 5
@@ -77,20 +80,6 @@ def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recor
     session.replay(session.shown.path.prediction, session.shown.verdict.reasons)
     session.change_rover(FRICTION, 0.05)
     assert not session.shown.verdict.traversable and session.shown.around is None
-
-
-def test_a_way_that_is_looked_at_stays_when_a_slider_moves_and_others_go_with_their_values():
-    session = walled_session(wall_with_gap)
-    session.plan_to(BEYOND)
-    session.show_path(5)
-    poses, way = session.shown.path.poses, session.shown.around
-    for friction in (0.7, 0.75):
-        session.change_rover(FRICTION, friction)
-        assert session.shown.index == 5 and len(session.shown.paths) == 6
-        np.testing.assert_array_equal(session.shown.path.poses, poses)
-    session.show_path(0)
-    session.change_rover(FRICTION, 0.72)
-    assert session.shown.index == 0 and session.shown.around is not way
 
 
 def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile():

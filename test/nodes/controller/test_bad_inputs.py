@@ -6,39 +6,30 @@ import math
 
 import pytest
 from geometry_msgs.msg import Twist
-from nav_msgs.msg import Odometry
 
 from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros import subscriptions
-from rover_planner.ros.qos import sensor_qos
-from support.messages import odometry_at
+from support.messages import set_field
 from support.ros_fixtures import RosRun
-from support.waiting import repeat_until, wait_until
+from support.waiting import wait_until
 
 CYCLES_IN_A_TENTH = 5
 
 
-def nan_rate(rover):
-    rover.joints.velocity[JOINTS.index("front_right_wheel")] = math.nan
-
-
-def other_frame(rover):
-    rover.imu.header.frame_id = "imu_link"
-
-
-GOOD = "all inputs are right"
+GOOD, NANS = "all inputs are right", [math.nan] * len(JOINTS)
+OTHER_FRAME = "imu is in frame 'imu_link'; it must be in 'base_link', or the parameters"
 SPOILS = [
-    (nan_rate, "velocity nan of front_right_wheel"),
-    (other_frame, "imu is in frame 'imu_link'; it must be in 'base_link', or the parameters"),
+    ("joints.velocity", NANS, "velocity nan of rocker_right"),
+    ("imu.header.frame_id", "imu_link", OTHER_FRAME),
 ]
 
 
 def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
     ros, rover, controller
 ):
-    for spoil, text in SPOILS:
+    for field, value, text in SPOILS:
         kept = copy.deepcopy(rover.joints), copy.deepcopy(rover.imu)
-        spoil(rover)
+        set_field(rover, field, value)
         spoilt = rover.wait_for_send()
         wait_until(lambda: rover.state == "fault", "the fault")
         wait_until(lambda text=text: rover.count_lines(text), "the reason in the log")
@@ -51,20 +42,6 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
         wait_until(lambda told=told: GOOD in " ".join(rover.log[told:]), "the good news")
         assert rover.count_lines(text) == 1
     assert ros.is_alive(controller)
-
-
-def test_odometry_that_cannot_be_used_is_refused_and_the_rover_drives_on(rover, controller):
-    sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
-    of_mast = odometry_at((0.0, 0.0, 0.0))
-    of_mast.child_frame_id = "mast"
-    refused = "odometry not used: odometry is of frame 'mast'"
-    repeat_until(
-        lambda: sender.publish(of_mast), lambda: rover.count_lines(refused), "the refusal"
-    )
-    heard = len(rover.commands)
-    wait_until(lambda: len(rover.commands) > heard + 10, "commands")
-    rover.wait_until_driven()
-    assert not rover.count_lines("rest by hold: odometry")
 
 
 def test_an_unforeseen_error_in_a_callback_is_a_fault_and_not_the_end(

@@ -7,9 +7,9 @@ The shipped controllers of ros2_control are held against the controller's order 
 import numpy as np
 from std_msgs.msg import Float64MultiArray
 
-from rover_physics.names import STEERING_JOINTS, WHEEL_JOINTS
+from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.steered_drive import SteeredDrive
-from rover_physics.rover.steering_joints import steering_joints
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_planner.nodes.traction_controller import NODE_NAME
 from rover_planner.nodes.warm_up import JOINTS
 from support.ros_fixtures import hear
@@ -28,9 +28,8 @@ def test_rates_and_steering_angles_are_those_of_the_commanded_motion(rover, star
         for group in ("commands", "velocity_commands", "steering_commands")
     )
     aims = SteeredDrive(LSR1).aim(SPEED, YAW_RATE)
-    steering = dict(zip((f"{n.removesuffix('_wheel')}_steering" for n in WHEEL_JOINTS),
-                        aims.angles.tolist(), strict=True))  # fmt: skip
-    angles = dict.fromkeys(JOINTS, 0.0) | {name: steering[name] for name in STEERING_JOINTS}
+    names, steering = steering_joints(LSR1), aims.angles[steered_wheels(LSR1)]
+    angles = dict.fromkeys(JOINTS, 0.0) | dict(zip(names, steering.tolist(), strict=True))
     angles["rocker_right"] -= OFFSET
     rover.joints.name = [f"robot_{name}" for name in JOINTS]
     rover.joints.position = [SIGNS[name] * angles[name] for name in JOINTS]
@@ -44,7 +43,7 @@ def test_rates_and_steering_angles_are_those_of_the_commanded_motion(rover, star
         joints=[f"robot_{name}" for name in WHEEL_JOINTS[::-1]],
     )
     rates = aims.speeds / LSR1.wheel.radius * [SIGNS[name] for name in WHEEL_JOINTS]
-    turned = np.array([SIGNS[name] * steering[name] for name in steering_joints(LSR1)])
+    turned = steering * [SIGNS[name] for name in names]
 
     def is_told(heard: list[Float64MultiArray], right: np.ndarray) -> bool:
         return heard and np.allclose(heard[-1].data, right, rtol=0.0, atol=1e-6)

@@ -6,8 +6,11 @@ from unittest.mock import Mock
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
+from rclpy import action
+from rclpy.node import Node
 
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
+from rover_planner.nodes import nav2_services
 from rover_planner.nodes.nav2_services import Nav2Services
 from support.grounds import make_terrain, wall_at, waves
 from support.waiting import wait_until
@@ -50,6 +53,20 @@ def test_the_poses_of_a_path_that_are_not_passable_are_named(server):
     assert all(0 <= index < len(poses) for index in answer.invalid_pose_indices)
     answer = ask(server, np.tile(poses[0], (1501, 1)))  # too many to be judged
     assert not answer.is_valid and len(answer.invalid_pose_indices) == 1501
+
+
+def test_the_action_is_remapped_by_its_name(ros, monkeypatch):
+    names, kind = [], SimpleNamespace(Result=None)
+    monkeypatch.setattr(
+        nav2_services, "find_type", lambda name: ("action" in name and kind) or None
+    )
+    monkeypatch.setattr(
+        action, "ActionServer", lambda _node, _kind, name, *_, **__: names.append(name)
+    )
+    rule = ["--ros-args", "-r", "~/compute_path_to_pose:=compute_path_to_pose"]
+    node = ros.spin(Node("judge", namespace="/one", context=ros.context, cli_args=rule))
+    Nav2Services(node, None, None, None, None)
+    assert names == ["/one/compute_path_to_pose"]
 
 
 def compute(server, start, goal):

@@ -21,17 +21,12 @@ from support.waiting import wait_until
 PRIOR = make_terrain(waves)
 
 
-def local_map(column, row, height=0.0, cells=20):
-    origin = PRIOR.origin[0] + 0.05 * column, PRIOR.origin[1] + 0.05 * row
-    return Terrain(np.full((cells, cells), height), 0.05, origin)
-
-
 def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, tmp_path):
     file = tmp_path / "prior.npz"
     save_terrain(file, PRIOR)
     response = client.load_map(file)
     assert response.result == 0 and len(response.map.data) == PRIOR.elevation.size
-    client.send_terrain(local_map(10, 10, 0.5))
+    client.send_terrain(Terrain(np.full((20, 20), 0.5), 0.05, np.add(PRIOR.origin, 0.5)))
     heard = hear(client, PointCloud2, f"{SERVER}/map", map_qos())
     wait_until(lambda: heard, "the map")
     cloud = heard[-1]

@@ -172,7 +172,7 @@ def test_ranges_lie_between_those_of_linear_programs_without_policy_and_margin(
 
 
 def has_equal_shares(prediction, i) -> bool:
-    _, _, along = balance_matrix(LSR1, prediction, i)
+    along = balance_matrix(LSR1, prediction, i)[2][:, 1]
     S = prediction.lateral[i]
     left = S - np.polyval(np.polyfit(along, S, 1), along)
     return bool(np.abs(left).max() <= 1e-6 * LSR1.weight)

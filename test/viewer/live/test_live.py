@@ -37,6 +37,7 @@ from rover_planner.viewer.live.live_state import (
     describe_learned,
     read_state,
 )
+from support.paths import poses_at
 from support.rovers import LSR1
 from support.waiting import repeat_until, wait_until
 
@@ -117,11 +118,18 @@ def test_the_energy_is_torque_times_rate_times_time(listener, talker):
     assert listener.latest().energy == pytest.approx(5 * 0.5 * 1.0 + 6 * 0.5 * 1.0 * 2.0)
 
 
-def test_estimates_of_the_controller_take_precedence_over_predictions(listener, talker):
-    loads = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
+def test_estimates_take_precedence_over_predictions_and_forces_end_with_their_source(
+    listener, talker
+):
+    life = DiagnosticArray(status=[DiagnosticStatus(message="a wheel slips")])
     talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
-    talker.odometry.publish(odometry())
-    received = []
+    talker.plans.publish(poses_path(poses_at([0.0, 1.0, 2.0]), "map"))
+    repeat_until(
+        lambda: (talker.verdict.publish(life), talker.odometry.publish(odometry())),
+        lambda: "server" in listener.latest().forces_from,
+        "predictions",
+    )
+    loads, received = np.arange(10.0, 16.0), []
 
     def is_estimated() -> bool:
         received.append(listener.latest())
@@ -129,25 +137,15 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
 
     publish_until(talker.estimated, labelled_array(loads, "wheel"), is_estimated, "the controller")
     np.testing.assert_allclose(received[-1].forces["wheel_loads"], loads)
-
-
-def test_predictions_of_a_silent_server_are_no_longer_shown(listener, talker):
-    life = DiagnosticArray(status=[DiagnosticStatus(message="a wheel slips")])
-    poses = np.column_stack([np.linspace(0.0, 2.0, 3), np.zeros((3, 2))])
-    talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
-    talker.plans.publish(poses_path(poses, "map"))
-    repeat_until(
-        lambda: (talker.verdict.publish(life), talker.odometry.publish(odometry())),
-        lambda: "server" in listener.latest().forces_from,
-        "predictions",
-    )
-    wait_until(lambda: not listener.latest().forces_from, "the server to count as silent")
+    wait_until(lambda: not listener.latest().forces_from, "both to count as silent")
     assert not listener.latest().forces and listener.latest().plan is not None
 
 
-def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, listener, talker):
+def test_what_is_invalid_or_missing_is_unknown_and_plans_are_refused(ros, listener, talker):
     assert read_state(LSR1, listener.latest()) is None
     assert listener.latest().terrain is None and listener.latest().newest is None
+    with pytest.raises(PlanningError, match="odometry"):
+        listener.request_plan(np.zeros(2))
     broken = JointState(name=["rocker_right"], position=[float("nan")])
     talker.joints.publish(broken)
     talker.odometry.publish(odometry(x=float("inf")))
@@ -160,6 +158,8 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     for values in (state.wheel_loads, state.friction_use, state.torque_use):
         assert np.isnan(values).all()
     assert listener.latest().forces_from == ""
+    with pytest.raises(PlanningError, match="can_traverse"):
+        listener.request_plan(np.zeros(2))
 
 
 def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
@@ -189,14 +189,6 @@ def test_a_trail_keeps_places_a_step_apart_and_the_newest_of_many():
     steps = np.diff(trail.places[:-1, 0])
     assert len(trail.places) <= MAX_TRAIL + 1 and trail.places[-1, 0] == pytest.approx(149.96)
     assert steps.min() > 0.5 * TRAIL_STEP and trail.add(ground, None).places is trail.places
-
-
-def test_a_plan_needs_odometry_and_a_server(listener, talker):
-    with pytest.raises(PlanningError, match="odometry"):
-        listener.request_plan(np.zeros(2))
-    publish_until(talker.odometry, odometry(), lambda: has_place(listener), "odometry")
-    with pytest.raises(PlanningError, match="can_traverse"):
-        listener.request_plan(np.zeros(2))
 
 
 def test_a_closed_link_leaves_no_thread_and_no_context():
