@@ -133,7 +133,9 @@ def test_on_learned_ground_the_rest_is_judged_once_too():
 def test_a_place_that_is_marked_ahead_stops(service, monitor):
     marked = MarkedPlaces((MarkedPlace(-1.5, 0.0, 0.3, "stuck there", "today"),))
     here = sight(service, STRAIGHT[0], 10.0)
-    found = monitor.look(replace(here, snapshot=replace(here.snapshot, marked=marked)))
+    assert monitor.look(here).state == WATCHING
+    there = replace(here, time=20.0, snapshot=replace(here.snapshot, marked=marked))
+    found = monitor.look(there)
     assert (found.state, found.judgement.code) == (STOPPED, MARKED_CODE)
 
 
