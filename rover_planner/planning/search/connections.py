@@ -179,13 +179,13 @@ def connect_frontier(judge: PathJudge, nodes: Nodes, start: Pose, goal: Pose) ->
     by_distance = everywhere[np.argsort(away, kind="stable")]
     found: list[Connection] = []
     chosen: list[np.ndarray] = []
-    apart, places = 0.25 * judge.rover.wheelbase, max(1, FRONTIER_BATCH // HEADINGS)
+    apart, places = 0.25 * judge.site.rover.wheelbase, max(1, FRONTIER_BATCH // HEADINGS)
     for first in range(0, len(by_distance), places):
         some = by_distance[first : first + places]
         asked = (some[:, None] + np.arange(HEADINGS)).ravel()
         poses = nodes.poses(asked)
         stands = np.array([code == "" for code in judge.stand(poses)])
-        stands &= ~judge.marked.refuses_ends(start, poses)
+        stands &= ~judge.site.marked.refuses_ends(start, poses)
         for node, pose in zip(asked[stands], poses[stands], strict=True):
             near = min((np.hypot(*(pose - other)[:2]) for other in chosen), default=np.inf)
             if 1e-9 < near < apart:

@@ -12,7 +12,6 @@ from rover_physics.traversability.verdict import with_refusals
 from rover_planner.maps.unobserved_ground import (
     UNOBSERVED_CODE,
     ObservedGround,
-    UnobservedShare,
 )
 from rover_planner.parameters.traverse_server import ALLOW, REFUSE
 from rover_planner.planning.marked_places import MARKED_CODE
@@ -21,24 +20,18 @@ from rover_planner.planning.path_query import Candidate
 
 @dataclass(frozen=True, eq=False)
 class UnobservedCheck:
-    """Holds paths of one rover against what was seen of one map."""
+    """Holds paths against what was seen of one map."""
 
-    rover: Rover
-    """The rover."""
     seen: ObservedGround
     """The seen part of the map."""
     rule: str
     """A value of the parameter blind_ground."""
 
-    def share(self, candidate: Candidate) -> UnobservedShare:
-        """Return how much of the ground under the belly was never seen along a path."""
-        return self.seen.share(self.rover, candidate.poses)
-
-    def hold(self, candidate: Candidate) -> Candidate:
+    def hold(self, rover: Rover, candidate: Candidate) -> Candidate:
         """Return a traversable path with a refusal where the rule refuses its ground."""
         if self.rule == ALLOW or not candidate.verdict.traversable:
             return candidate
-        share = self.share(candidate)
+        share = self.seen.share(rover, candidate.poses)
         first = share.first_refused(self.rule)
         if first < 0:
             return candidate
@@ -49,7 +42,7 @@ class UnobservedCheck:
         )
         return candidate.refuse_at(first, UNOBSERVED_CODE, reason)
 
-    def refuses(self, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    def refuses(self, rover: Rover, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
         """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).
 
         Each pose counts. `hold` looks at a path where the belly has moved on by a cell, so a path
@@ -58,7 +51,7 @@ class UnobservedCheck:
         refused = np.zeros(len(pieces), bool)
         if self.rule == ALLOW or not pieces:
             return refused
-        below = self.seen.refused_below(self.rover, np.concatenate(pieces), self.rule)
+        below = self.seen.refused_below(rover, np.concatenate(pieces), self.rule)
         firsts = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
         return np.logical_or.reduceat(below, firsts)
 
