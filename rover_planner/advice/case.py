@@ -29,7 +29,7 @@ from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
-from rover_planner.planning.search.unobserved_check import UnobservedCheck
+from rover_planner.planning.search.unobserved_check import NONE_REFUSED, UnobservedCheck
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
@@ -57,8 +57,8 @@ class Case:
     """Standard deviations by which the map's heights may be wrong."""
     accepted_chance: float = ACCEPTED_CHANCE
     """Largest chance of failure of a path that passes."""
-    unobserved_check: UnobservedCheck | None = None
-    """Refuses ground under the belly that was never seen; None allows it."""
+    unobserved_check: UnobservedCheck = NONE_REFUSED
+    """Refuses ground under the belly that was never seen."""
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
 

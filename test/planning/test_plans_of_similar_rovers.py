@@ -33,7 +33,7 @@ def plan(rover: Rover, seed: int):
     yield None if found.path is None else found.path.poses / units
     judge = PathJudge(Site(rover, enlarged(rocky(seed), size), SURE))
     answer = judge.search(START * units, GOAL * units, 0.35 * size)
-    yield answer.nearest, answer.alternatives_tried, answer.goal_offset / size
+    yield answer.choice, answer.alternatives_tried, answer.goal_offset / size
     for candidate in answer.candidates:
         yield candidate.verdict.codes
         yield candidate.poses / units

@@ -125,8 +125,8 @@ class PathJudgement:
         if self.candidate is None or self.judge is None:
             return None
         site = self.judge.site
-        check = site.unobserved_check
-        return None if check is None else check.seen.share(site.rover, self.candidate.poses)
+        seen = site.unobserved_check.seen
+        return None if seen is None else seen.share(site.rover, self.candidate.poses)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

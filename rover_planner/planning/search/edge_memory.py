@@ -11,7 +11,6 @@ from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.changes import find_changes, have_same_layers
-from rover_planner.parameters.traverse_server import ALLOW
 from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
@@ -99,7 +98,7 @@ def _is_alike(asked: Site, site: Site) -> bool:
     return (
         asked.rover == site.rover
         and asked.options == site.options
-        and _rule_of(asked) == _rule_of(site)
+        and asked.unobserved_check.rule == site.unobserved_check.rule
         and asked.marked == site.marked
         and old.resolution == new.resolution
         and old.origin == new.origin
@@ -108,24 +107,10 @@ def _is_alike(asked: Site, site: Site) -> bool:
     )
 
 
-def _rule_of(site: Site) -> str:
-    """Return the value of blind_ground of a site."""
-    return ALLOW if site.unobserved_check is None else site.unobserved_check.rule
-
-
-def _seen(site: Site) -> NDArray[np.uint8] | None:
-    """Return (ny, nx) what was seen of each cell; None if the rule does not ask."""
-    return (
-        None
-        if site.unobserved_check is None or _rule_of(site) == ALLOW
-        else site.unobserved_check.seen.kinds
-    )
-
-
 @lru_cache(maxsize=1)
 def _count_changes(asked: Site, site: Site) -> CellCounts:
     """Return the cells in which the maps of two sites that are alike differ, as counts."""
-    before, now = _seen(asked), _seen(site)
+    before, now = asked.unobserved_check.kinds, site.unobserved_check.kinds
     if asked.terrain is site.terrain and before is now:
         return CellCounts(site.terrain, np.zeros(site.terrain.elevation.shape, bool))
     changed = find_changes(asked.terrain, site.terrain)[1:-1, 1:-1]

@@ -113,24 +113,17 @@ class PathJudge:
         return replace(answer, goal=end, goal_offset=offset, alternatives_tried=tried)
 
     def _query(self, start: Pose, goal: Pose) -> PathAnswer:
-        site = self.site
-        return self._hold(answer_path_query(site.rover, site.terrain, start, goal, site.options))
-
-    def _hold(self, answer: PathAnswer) -> PathAnswer:
-        """Return an answer whose choice is among the candidates whose ground is not refused.
+        """Return the answer whose choice is among the candidates whose ground is not refused.
 
         If all that are traversable are refused, the best of them is explained.
         """
         site = self.site
+        answer = answer_path_query(site.rover, site.terrain, start, goal, site.options)
         if not answer.traversable:
             return answer
-        held = choose_by_chance(
-            site.rover,
-            site.terrain,
-            [site.hold(candidate) for candidate in answer.candidates],
-            site.options,
-        )
-        return held if held.traversable else replace(held, nearest=answer.nearest)
+        paths = [site.hold(candidate) for candidate in answer.candidates]
+        held = choose_by_chance(site.rover, site.terrain, paths, site.options)
+        return held if held.traversable else replace(held, choice=answer.choice)
 
     def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
         """Return whether another goal within `tolerance` [m] may help.
@@ -166,7 +159,9 @@ class PathJudge:
         self.asked_poses += len(poses)
         return self.site.hold(self._judge_path(poses, stop_at_failure=stop_at_failure))
 
-    def _judge_path(self, poses: Pose, *, stop_at_failure: bool = False) -> Candidate:
+    def _judge_path(
+        self, poses: NDArray[np.float64], *, stop_at_failure: bool = False
+    ) -> Candidate:
         site = self.site
         return check_path(
             site.rover,
@@ -262,7 +257,7 @@ class PathJudge:
         code, reason = verdict.codes[0], verdict.reasons[0]
         if code and self._stand_otherwise(pose[None, :], *OTHER_MOTIONS)[0]:
             code, reason = "", ""
-        if site.unobserved_check is not None and self._find_unobserved([pose[None, :]], [code]):
+        if self._find_unobserved([pose[None, :]], [code]):
             return UNOBSERVED_CODE, site.unobserved_check.describe()
         entered = None if code else site.marked.find(np.stack([start, pose]))
         return (code, reason) if entered is None else (MARKED_CODE, entered[1].describe())
@@ -295,8 +290,6 @@ class PathJudge:
         """Return the indices of pieces that pass by their codes, but are over unseen ground."""
         site = self.site
         passing = [row for row, code in enumerate(codes) if not code]
-        if site.unobserved_check is None or not passing:
-            return []
         refused = site.unobserved_check.refuses(site.rover, [pieces[row] for row in passing])
         return [passing[row] for row in np.flatnonzero(refused).tolist()]
 

@@ -76,7 +76,7 @@ class SearchResult:
     """The path with prediction and verdict; None unless it was found."""
     pieces: Sequence[Piece]
     """Its pieces; empty without a path."""
-    bound: float
+    suboptimality: float
     """Largest factor by which it cost more, before smoothing, than the best path of the lattice;
     infinite if that is not known."""
     expanded: int
@@ -126,7 +126,7 @@ class SearchResult:
                 "edges": self.edges,
                 "seconds_first": self.seconds_first,
                 "seconds": self.seconds,
-                "bound": self.bound,
+                "bound": self.suboptimality,
                 "repeatable": self.repeatable,
                 "warning": self.warning,
                 "closed_area": None if closed is None else closed.area,
@@ -257,7 +257,7 @@ class _PathFinder:
 
     def _run(self, search: LatticeSearch) -> SearchResult:
         """Search the lattice."""
-        progress = search.run(self._allowed)
+        progress = search.run(self._tell_and_go_on)
         if progress.best is not None:
             path, pieces = self._smooth(progress)
             rest = self._describe_rest(path)
@@ -380,8 +380,8 @@ class _PathFinder:
             found += [replace(one, surcharge=missed) for one in connections]
         return found
 
-    def _allowed(self, search: LatticeSearch) -> bool:
-        """Return whether the search may go on; tell of its progress."""
+    def _tell_and_go_on(self, search: LatticeSearch) -> bool:
+        """Tell of the progress of the search, and return whether it may go on."""
         if self._on_progress is not None:
             is_found = search.progress.best is not None
             self._on_progress(search.progress if is_found else self._told or search.progress)
@@ -420,14 +420,13 @@ class _PathFinder:
         closed: ClosedArea | None = None,
     ) -> SearchResult:
         progress = self.progress
-        known = progress.best is not None and progress.bound > 0.0
-        bound = progress.cost / progress.bound if known else math.inf
+        is_bounded = progress.best is not None and progress.least_cost > 0.0
         return SearchResult(
             outcome=outcome,
             reason=reason,
             path=path,
             pieces=pieces,
-            bound=bound,
+            suboptimality=progress.cost / progress.least_cost if is_bounded else math.inf,
             expanded=0 if search is None else search.shortest.expanded,
             edges_judged=progress.judged,
             edges=0 if search is None else search.edges.count,

@@ -7,7 +7,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
-from rover_planner.planning.search.unobserved_check import UnobservedCheck
+from rover_planner.planning.search.unobserved_check import NONE_REFUSED, UnobservedCheck
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +20,8 @@ class Site:
     """The ground, map frame."""
     options: PathQueryOptions
     """Options of candidates and of the judgement of paths."""
-    unobserved_check: UnobservedCheck | None = None
-    """Refuses ground under the belly that was never seen; None allows it."""
+    unobserved_check: UnobservedCheck = NONE_REFUSED
+    """Refuses ground under the belly that was never seen."""
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
 
@@ -30,5 +30,4 @@ class Site:
 
     def hold(self, path: Candidate) -> Candidate:
         """Return a path, refused where its ground was never seen or is marked."""
-        check = self.unobserved_check
-        return self.marked.hold(path if check is None else check.hold(self.rover, path))
+        return self.marked.hold(self.unobserved_check.hold(self.rover, path))

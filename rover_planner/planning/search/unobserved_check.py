@@ -22,14 +22,19 @@ from rover_planner.planning.path_query import Candidate
 class UnobservedCheck:
     """Holds paths against what was seen of one map."""
 
-    seen: ObservedGround
-    """The seen part of the map."""
-    rule: str
+    seen: ObservedGround | None = None
+    """The seen part of the map; None if it is not known, then the rule is ALLOW."""
+    rule: str = ALLOW
     """A value of the parameter blind_ground."""
+
+    @property
+    def kinds(self) -> NDArray[np.uint8] | None:
+        """(ny, nx) what was seen of each cell; None if the rule does not ask."""
+        return None if self.seen is None or self.rule == ALLOW else self.seen.kinds
 
     def hold(self, rover: Rover, candidate: Candidate) -> Candidate:
         """Return a traversable path with a refusal where the rule refuses its ground."""
-        if self.rule == ALLOW or not candidate.verdict.traversable:
+        if self.seen is None or self.rule == ALLOW or not candidate.verdict.traversable:
             return candidate
         share = self.seen.share(rover, candidate.poses)
         first = share.first_refused(self.rule)
@@ -48,9 +53,8 @@ class UnobservedCheck:
         Each pose counts. `hold` looks at a path where the belly has moved on by a cell, so a path
         of pieces that are not refused passes there.
         """
-        refused = np.zeros(len(pieces), bool)
-        if self.rule == ALLOW or not pieces:
-            return refused
+        if self.seen is None or not pieces:
+            return np.zeros(len(pieces), bool)
         below = self.seen.refused_below(rover, np.concatenate(pieces), self.rule)
         firsts = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
         return np.logical_or.reduceat(below, firsts)
@@ -61,6 +65,10 @@ class UnobservedCheck:
 
     def _name_rule(self) -> str:
         return f"(blind_ground is {self.rule})"
+
+
+NONE_REFUSED = UnobservedCheck()
+"""Allows all ground."""
 
 
 def physical(candidate: Candidate) -> Candidate:

@@ -107,7 +107,7 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
     for k, poses in enumerate(paths):
         yield WorkStep(PATH, k + 1, len(paths))
         judged.append(_judge(asked, poses))
-    chosen = choose(tuple(judged)).nearest
+    chosen = choose(tuple(judged)).choice
     verdict = judged[chosen].verdict
     policies = {verdict.policy: verdict}
     return Shown(asked, tuple(judged), chosen, len(judged), by_policy=policies)

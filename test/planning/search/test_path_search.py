@@ -70,7 +70,7 @@ def test_a_way_that_passes_leads_to_the_goal_around_a_wall_that_refuses_all_cand
 
 def test_a_search_that_ends_by_itself_is_near_the_best_and_judges_few_edges(around):
     _, answer, _ = around
-    assert answer.repeatable and 1.0 <= answer.bound <= 1.0201
+    assert answer.repeatable and 1.0 <= answer.suboptimality <= 1.0201
     assert 0 < answer.edges_judged < 0.1 * answer.edges and answer.warning == ""
 
 
@@ -127,7 +127,7 @@ def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(
     assert (again.edges_judged, again.cost) == (answer.edges_judged, answer.cost)
     known = find_path(question, LONG, memory)  # hardly anything is judged again
     assert known.edges_judged < 0.5 * answer.edges_judged
-    assert known.bound <= 1.0201 and known.cost == pytest.approx(answer.cost, rel=0.03)
+    assert known.suboptimality <= 1.0201 and known.cost == pytest.approx(answer.cost, rel=0.03)
     assert find_path(ask(question.site.terrain, friction=0.5), LONG, memory).edges_judged > 0
 
 
