@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of answers are drawn for accepted and refused paths, on maps with and without holes."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -65,7 +63,7 @@ def test_forces_that_no_verdict_asks_for_are_shaded(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
     ledge = make_terrain(lambda x, y: 0.06 * (x < -2.5), half=4.5)
-    options = dataclasses.replace(COARSE, count=1, waypoint_spacing=0.02)
+    options = PathQueryOptions(count=1)
     for goal, is_beyond in (((-3.2, 0, 0), False), ((-1.5, 0, 0), True)):
         answer = answer_path_query(LSR1, ledge, (-3.5, 0, 0), goal, options)
         falls = answer.chosen.prediction.falling.any(axis=1)

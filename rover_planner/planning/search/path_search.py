@@ -320,7 +320,8 @@ class _PathFinder:
 
         There is none if start and goal are the same.
         """
-        rover, found = self._query.rover, []
+        rover = self._query.rover
+        found: list[Piece] = []
         swing = swing_radius(rover) if can_turn_on_the_spot(rover) else None
         for gear, turn in ((Gear.FORWARD, None), (Gear.ON_THE_SPOT, swing)):
             poses = generate_candidates(

@@ -16,7 +16,7 @@ from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import reference_predictions, steered_predictions
 from support.rough_grounds import bouldered, fractal, plane, random_poses, rocky, smooth
-from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gap, wheel_gaps
+from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_gap, wheel_gaps
 from support.rovers import LSR1
 
 slopes = st.floats(-0.4, 0.4)
@@ -111,8 +111,8 @@ def test_999_of_1000_wheels_touch_within_a_tenth_of_a_millimetre_and_none_is_in_
     gaps = []
     for ground, prediction in rough_predictions(seeds):
         for k, i in enumerate(np.flatnonzero(prediction.settled)[::EVERY]):
-            centre, axis = prediction.wheel_centres[i, k % 6], wheel_axes(LSR1, prediction, i)
-            gaps.append(wheel_gap(LSR1, ground, centre, axis[k % 6]))
+            axle = place_rover(LSR1, prediction, i).axles[k % 6]
+            gaps.append(wheel_gap(LSR1, ground, prediction.wheel_centres[i, k % 6], axle))
     gaps = np.array(gaps)
     assert gaps.size >= 39 * seeds
     assert (np.abs(gaps) <= 1e-4).mean() >= 0.999
@@ -129,10 +129,17 @@ def test_no_rim_sinks_into_steep_cells_almost_as_large_as_the_wheel():
     assert gaps.min() >= -1e-4
 
 
+def test_no_rim_sinks_into_cells_twenty_times_as_large_as_the_wheel():
+    heights = [[-0.75, -1.22, -0.97], [-1.45, -1.37, -1.39], [-1.43, -2.79, -2.34]]
+    ground = Terrain(np.array(heights), 2.0, (-2.0, -2.0))
+    prediction = judge_poses(LSR1, ground, [[-0.13, 0.08, -1.24]])[0]
+    assert wheel_gaps(LSR1, ground, prediction, 0).min() >= -1e-4
+
+
 @both_sets
 def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
     for case, prediction, i in waypoints_of(predict()):
-        points, axes = prediction.contact_points[i], wheel_axes(LSR1, prediction, i)
+        points, axes = prediction.contact_points[i], place_rover(LSR1, prediction, i).axles
         from_centre = points - prediction.wheel_centres[i]
         along = np.einsum("wk,wk->w", from_centre, axes)
         radial = np.linalg.norm(from_centre - along[:, None] * axes, axis=1)
