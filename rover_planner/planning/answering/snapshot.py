@@ -116,7 +116,7 @@ class Snapshot:
         planner = self.settings.parameters.planner
         if planner == LATTICE:
             if may_search:
-                return self._search_around(judge, ends, None)
+                return self._search_around(judge, ends, tolerance, None)
             tolerance = 0.0
         if not (are_on_map or tolerance):  # no candidate helps: one tells as much as all
             judge = replace(judge, options=judge.options.change(count=1))
@@ -130,16 +130,21 @@ class Snapshot:
         is_final = judged.traversable or starts_unobserved or not may_search
         if is_final or planner == FAN:
             return judged
-        return self._search_around(judge, ends, judged)
+        return self._search_around(judge, ends, tolerance, judged)
 
     def _search_around(
-        self, judge: PathJudge, ends: tuple[Pose, Pose], refused: PathJudgement | None
+        self,
+        judge: PathJudge,
+        ends: tuple[Pose, Pose],
+        tolerance: float,
+        refused: PathJudgement | None,
     ) -> PathJudgement:
         """Search a path around obstacles.
 
         Args:
             judge: The model.
             ends: Start and goal.
+            tolerance: As in `answer` [m].
             refused: The judgement on the candidates; None if none were tried.
         """
         query = SearchQuery(
@@ -149,6 +154,7 @@ class Snapshot:
             judge.options,
             judge.unobserved_check,
             self.marked,
+            tolerance,
         )
         found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
         if found.path is not None:

@@ -30,10 +30,11 @@ LARGEST_TURN = 3
 DETOUR = 1.3
 """Largest length of a curve over the distance of its ends."""
 
+MISSED_PRICE = 10.0
+"""Cost of each metre that is left from the end of a path to the goal [m of level ground]."""
+
 FRONTIER_PLACES = 48
 """Number of places at the frontier that are offered to the search."""
-FRONTIER_PRICE = 10.0
-"""Cost of each metre that is left from there to the goal [m of level ground]."""
 FRONTIER_BATCH = 1000
 """Number of poses at the frontier that the model is asked about at once."""
 
@@ -58,7 +59,7 @@ class Connection:
 
     def piece(self, cost: float) -> Piece:
         """Return it as a piece of path with its cost [m]."""
-        return Piece(self._poses, self.gear, cost)
+        return Piece(self._poses, self.gear, cost, self.surcharge)
 
     @cached_property
     def _poses(self) -> Pose:
@@ -168,7 +169,7 @@ def _about(pose: Pose) -> Pose:
     return np.concatenate([pose[..., :2], wrap(pose[..., 2:] + np.pi)], axis=-1)
 
 
-def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connection]:
+def connect_frontier(judge: PathJudge, nodes: Nodes, start: Pose, goal: Pose) -> list[Connection]:
     """Return the nodes nearest to a goal on which the rover can stand, as ends of a path.
 
     They lie at least a quarter of the wheelbase apart. What is left to the goal has a price.
@@ -184,6 +185,7 @@ def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connect
         asked = (some[:, None] + np.arange(HEADINGS)).ravel()
         poses = nodes.poses(asked)
         stands = np.array([code == "" for code in judge.stand(poses)])
+        stands &= ~judge.marked.refuses_ends(start, poses)
         for node, pose in zip(asked[stands], poses[stands], strict=True):
             near = min((np.hypot(*(pose - other)[:2]) for other in chosen), default=np.inf)
             if 1e-9 < near < apart:
@@ -192,7 +194,7 @@ def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connect
                 if len(chosen) == FRONTIER_PLACES:
                     return found
                 chosen.append(pose)
-            price = FRONTIER_PRICE * float(np.hypot(*(pose - goal)[:2]))
+            price = MISSED_PRICE * float(np.hypot(*(pose - goal)[:2]))
             make = partial(np.asarray, pose[None, :])
             found.append(Connection(int(node), Gear.FORWARD, 0.0, make, price))
     return found

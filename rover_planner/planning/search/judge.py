@@ -12,11 +12,11 @@ the time at the limits: each moment counts by the square of ((used share of the 
 limit) - 1/2) x 2, which is 0 up to half of a limit and 1 at it.
 """
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -110,7 +110,8 @@ class PathJudge:
         """
         answer, end, tried = self._query(start, goal), goal, 0
         if not answer.traversable and self._fails_at(answer, goal, tolerance):
-            for alternative in self._goals_to_stand_on(start, goal, tolerance):
+            rings = self.goals_near(start, goal, tolerance)
+            for alternative in (one for ring in rings for one in islice(ring, _QUERIES_PER_RING)):
                 tried += 1
                 other = self._query(start, alternative)
                 if other.traversable:
@@ -156,16 +157,16 @@ class PathJudge:
         ]
         return any(np.hypot(*failure[:2]) <= near for failure in failures)
 
-    def _goals_to_stand_on(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Pose]:
-        """Yield alternative goals where the rover can stand, nearest first, a few per ring.
+    def goals_near(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Iterator[Pose]]:
+        """Yield rings of alternative goals where the rover can stand, from near to far.
 
         Goals on the start's side of a ring come first. If these cannot be reached, those behind
-        them rarely can, and each goal costs the evaluation of all candidates.
+        them rarely can.
         """
         for ring in rings_within(start, goal, tolerance, self.rover.wheel.radius):
-            judged = ((pose, self._judge_path(pose[None, :])) for pose in ring)
-            standing = (pose for pose, one in judged if one.verdict.traversable)
-            yield from itertools.islice(standing, _QUERIES_PER_RING)
+            reached = np.array(ring)[~self.marked.refuses_ends(start, np.array(ring))]
+            judged = ((pose, self._hold_path(self._judge_path(pose[None, :]))) for pose in reached)
+            yield (pose for pose, one in judged if one.verdict.traversable)
 
     def check(self, poses: NDArray[np.float64], *, stop_at_failure: bool = False) -> Candidate:
         """Judge one given path of poses (n, 3), if wanted only up to its first failure.
@@ -262,15 +263,16 @@ class PathJudge:
             codes[row] = UNOBSERVED_CODE
         return tuple(codes)
 
-    def refuse(self, pose: Pose) -> tuple[str, str]:
-        """Return code and reason why the rover cannot stand at a pose, empty if it can."""
+    def refuse(self, start: Pose, pose: Pose) -> tuple[str, str]:
+        """Return code and reason why a path from a start cannot end at a pose, empty if it can."""
         verdict = self._judge_standing(pose[None, :])
         code, reason = verdict.codes[0], verdict.reasons[0]
         if code and self._stand_otherwise(pose[None, :], *OTHER_MOTIONS)[0]:
             code, reason = "", ""
         if self.unobserved_check is not None and self._find_unobserved([pose[None, :]], [code]):
             return UNOBSERVED_CODE, self.unobserved_check.describe()
-        return code, reason
+        entered = None if code else self.marked.find(np.stack([start, pose]))
+        return (code, reason) if entered is None else (MARKED_CODE, entered[1].describe())
 
     def _stand_otherwise(
         self, poses: NDArray[np.float64], *motions: tuple[float, bool]
@@ -304,11 +306,14 @@ class PathJudge:
         return [passing[row] for row in np.flatnonzero(refused).tolist()]
 
 
-def cost_of_path(rover: Rover, gear: Gear, path: Candidate) -> float:
-    """Return the cost [m] of a path that passes and is one piece."""
-    time, energy = float(path.prediction.time[-1]), float(path.prediction.energy[-1])
-    exposure = find_exposure(rover, path.prediction)
-    return find_cost(rover, gear, PieceVerdict("", time, energy, exposure))
+def cost_of_path(rover: Rover, pieces: Sequence[Piece], path: Candidate) -> float:
+    """Return the cost [m] of a path of pieces that passes."""
+    prices = np.repeat(
+        [PRICES[one.gear] for one in pieces], [len(one.poses) - 1 for one in pieces]
+    )
+    time, energy = prices @ np.diff(path.prediction.time), float(path.prediction.energy[-1])
+    priced = PieceVerdict("", float(time), energy, find_exposure(rover, path.prediction))
+    return find_cost(rover, Gear.FORWARD, priced) + sum(one.surcharge for one in pieces)
 
 
 def find_cost(rover: Rover, gear: Gear, piece: PieceVerdict) -> float:

@@ -40,6 +40,9 @@ class SearchQuery:
     """Refuses ground under the belly that was never seen; None allows it."""
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
+    tolerance: float = 0.0
+    """Largest distance from the goal's position [m] at which the path may end if the rover cannot
+    stand at the goal; the heading stays."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", self.options.fit(self.rover))

@@ -15,7 +15,8 @@ from rover_planner.planning.search import lattice_search, query
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.graph import ShortestPaths, edge_cost
 from rover_planner.planning.search.ground_estimate import FULL_DOUBT, estimate_ground
-from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.judge import PathJudge, cost_of_path
+from rover_planner.planning.search.lattice_search import join_pieces
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.path_search import (
     FOUND,
@@ -24,8 +25,10 @@ from rover_planner.planning.search.path_search import (
     OUT_OF_TIME,
     find_path,
 )
+from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.grounds import make_terrain, pen, raised, waves
+from support.paths import poses_at
 from support.rough_grounds import fractal, plane, rocky
 from support.rovers import LSR1
 from support.services import load_settings
@@ -325,11 +328,28 @@ def test_a_search_goes_around_what_its_chance_refuses(slippery):
     assert np.abs(answer.path.poses[:, 1]).max() > 0.5
 
 
+def test_a_path_costs_as_much_as_its_pieces_each_in_its_gear():
+    """Where chances are weighed, a path was priced as if all of it were driven forwards."""
+    level, x = make_terrain(lambda x, y: 0.0 * x, half=1.5), np.linspace(-0.5, 0.5, 41)
+    judge = PathJudge(LSR1, level, OPTIONS.change(accepted_chance=1.0))
+    ahead = Piece(poses_at(x), Gear.FORWARD)
+    pieces = [ahead, Piece(ahead.poses[::-1], Gear.BACKWARD)]
+    path = judge.check(join_pieces(pieces)[0])
+    alone = sum(one.cost for one in judge.judge_pieces(pieces))
+    assert cost_of_path(LSR1, pieces, path) == pytest.approx(alone, rel=0.02)
+
+
 def test_a_search_goes_around_what_may_fail_if_the_weight_of_chances_pays_for_it(slippery):
     question, coarse = ask_across(slippery, 1.0), replace(LONG, cell=0.3)
     straight = find_path(question, coarse).path
     assert np.abs(straight.poses[:, 1]).max() < 0.5
-    answer = find_path(question, replace(coarse, chance_weight=50.0))
+    told: list[bool] = []
+    answer = find_path(
+        question,
+        replace(coarse, chance_weight=50.0),
+        on_progress=lambda progress: told.append(progress.best is not None),
+    )
+    assert told == sorted(told)  # a path that was found stays so
     path, chance = answer.path, answer.report()["failure_chance"]
     assert answer.outcome == FOUND and path.verdict.failure_chance == chance < 0.05
     assert np.abs(path.poses[:, 1]).max() > 0.5 and path.length > straight.length + 0.1
