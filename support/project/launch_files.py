@@ -39,12 +39,17 @@ def launch_modules() -> Iterator[None]:
         yield
 
 
+def kind(action: Any) -> str:
+    """Return the name of an action's class."""
+    return type(action).__name__
+
+
 def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
     """Run a launch file; return its arguments with defaults, its other actions and its names."""
     with launch_modules():
         names = runpy.run_path(str(TOP / "launch" / name))
     actions = names["generate_launch_description"]().given[0]
-    declared = [action for action in actions if type(action).__name__ == "DeclareLaunchArgument"]
+    declared = [action for action in actions if kind(action) == "DeclareLaunchArgument"]
     assert all(action.description for action in declared)
     defaults = {action.given[0]: action.default_value for action in declared}
     return defaults, [action for action in actions if action not in declared], names
@@ -73,8 +78,7 @@ def simulation_commands(**given: str) -> dict[str, list[str]]:
 def _value(given: Any, values: dict[str, str]) -> Any:
     """Return what an argument stands for: a text, or that of a substitution."""
     while isinstance(given, Kept):
-        is_name = type(given).__name__ == "LaunchConfiguration"
-        given = values[given.given[0]] if is_name else given.given[0]
+        given = values[given.given[0]] if kind(given) == "LaunchConfiguration" else given.given[0]
     return given
 
 

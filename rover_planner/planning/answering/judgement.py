@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rover_physics.names import EQUAL
 from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
-from rover_physics.traversability.verdict import BOUNDS, EXTREMES
+from rover_physics.traversability.verdict import BOUND_EXTREMES, EXTREMES
 from rover_planner.maps.unobserved_ground import UnobservedShare
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_query import Candidate, PathAnswer
@@ -20,7 +20,7 @@ from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
 
-REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS, "failure_chance")
+REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUND_EXTREMES, "failure_chance")
 """Fields of a verdict that a report has."""
 
 
