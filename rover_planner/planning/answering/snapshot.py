@@ -45,6 +45,12 @@ class GivenPath:
     """`msg_adapters.identity.path_hash` of the message."""
     stamp: str = ""
     """Stamp of the message, "seconds.nanoseconds"."""
+    code: str = "no_path"
+    """Code of the refusal."""
+
+    def judge(self, known: "Snapshot") -> PathJudgement:
+        """Judge whether the rover can drive it; errors are those of `Snapshot.check_path`."""
+        return replace(known, path=self).check_path().complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +192,7 @@ class Snapshot:
     def refuse_if_missing(self) -> PathJudgement | None:
         """Return a refusal if there is no path or no map to use, else None."""
         if self.path.poses is None:
-            return refusal("no_path", self.path.refusal)
+            return refusal(self.path.code, self.path.refusal)
         return self.refuse_map()
 
     def refuse_map(self) -> PathJudgement | None:

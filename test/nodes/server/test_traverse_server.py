@@ -12,6 +12,7 @@ from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.traversability.classification import PASSABLE
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
+from rover_planner.planning.answering.questions import PathQuestion
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, waves
 from support.messages import send_map_odom
@@ -99,9 +100,10 @@ def test_results_are_those_of_the_rover_of_the_question(shared):
     """Angles of a path of one rover had the wheel radius of the next one."""
     server = shared.server
     known = server.service.snapshot()
-    judged, about = known.answer(START, GOAL), server.desk.identify("can_traverse", "", known)
+    question = PathQuestion(START, GOAL)
+    about = server.desk.register.identify("can_traverse", question, known)
     assert shared.client.set_parameter("rover", "m2020") == (True, "")
-    results = run_in_executor(server, lambda: server.publish(judged, about))
+    results = run_in_executor(server, lambda: server.publish(question.judge(known), about))
     assert shared.client.set_parameter("rover", "lsr1") == (True, "")
     assert results.rover is known.settings.rover
 
