@@ -331,7 +331,7 @@ def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) 
     Args:
         rover: The rover.
         mission: The goals.
-        answers: The verdict on each goal, as `MissionPlanner.ask` returns it.
+        answers: The verdict on each goal, as mission_planner --json prints it.
     """
     table = Table(
         title=f"Answers of /traverse_server for {rover.name}",

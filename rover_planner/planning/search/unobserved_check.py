@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
 from rover_planner.maps.unobserved_ground import (
+    ALLOW,
+    REFUSE,
     UNOBSERVED_CODE,
     ObservedGround,
 )
-from rover_planner.parameters.traverse_server import ALLOW, REFUSE
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_query import Candidate
 

@@ -9,8 +9,14 @@ import pytest
 
 from rover_physics import Terrain, load_rover
 from rover_planner.errors import PlanningError
-from rover_planner.maps.unobserved_ground import ASSUMED, ObservedGround, observed_ground
-from rover_planner.parameters.traverse_server import ALLOW_FOOTPRINT, AUTO, LATTICE, REFUSE
+from rover_planner.maps.unobserved_ground import (
+    ALLOW_FOOTPRINT,
+    ASSUMED,
+    REFUSE,
+    ObservedGround,
+    observed_ground,
+)
+from rover_planner.parameters.traverse_server import AUTO, LATTICE
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import (
