@@ -11,8 +11,8 @@ from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.changes import find_changes, have_same_layers
 from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto
-from rover_planner.maps.living_map import LivingMap
 from rover_planner.parameters.traverse_server import SUREST, TraverseServerParameters
+from rover_planner.planning.answering.living_map import LivingMap
 from support.grounds import make_terrain, waves
 
 TOPIC = "elevation_cloud"
