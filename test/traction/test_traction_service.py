@@ -171,7 +171,19 @@ def test_it_pushes_up_a_slope_with_the_weight_along_it_within_a_third_of_a_secon
     wanted = rover.weight * np.sin(-rig.pitch) * rover.wheel.radius
     while rig.run(1).torques.sum() < 0.9 * wanted:
         assert rig.now < 0.33
-    assert rig.run(60).torques.sum() == pytest.approx(wanted, rel=0.01)
+    update = rig.run(60)
+    assert update.torques.sum() == pytest.approx(wanted, rel=0.01)
+    assert update.answer.loads[0] > 1.2 * update.answer.loads[2]  # rear and front
+
+
+def test_wheels_that_spin_are_slowed_and_do_not_hide_that_the_others_stand():
+    rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
+    rig.velocities |= STANDING
+    rig.velocities |= dict.fromkeys(("front_right_wheel", "front_left_wheel"), 1.0)
+    before, after = rig.run(10).torques, rig.run(200).torques
+    assert before[2] < 0.0 < before[0]
+    assert after[0] > 2.0 * before[0]
+    assert np.abs(after).max() == LSR1.wheel.max_torque
 
 
 # Wheels that steer
