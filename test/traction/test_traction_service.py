@@ -176,6 +176,14 @@ def test_it_pushes_up_a_slope_with_the_weight_along_it_within_a_third_of_a_secon
     assert update.answer.loads[0] > 1.2 * update.answer.loads[2]  # rear and front
 
 
+def test_torques_that_are_no_numbers_are_a_fault(monkeypatch):
+    rig = Rig()
+    answer = replace(rig.run().answer, torques=np.full(6, np.nan))
+    monkeypatch.setattr(rig.service, "_share_torques", lambda rows: answer)
+    update = rig.run(1)
+    assert "must be finite" in update.fault and not update.torques.any()
+
+
 def test_wheels_that_spin_are_slowed_and_do_not_hide_that_the_others_stand():
     rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
     rig.velocities |= STANDING
