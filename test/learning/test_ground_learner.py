@@ -142,6 +142,13 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
+def test_stamps_that_are_not_regular_make_windows_no_longer():
+    rows = climb(ROVER, SLOPE, 12.0)[::5]
+    regular = learn(rows).window
+    rows[:, TIME] += np.random.default_rng(3).uniform(-0.005, 0.005, len(rows))
+    assert learn(rows).window.duration == pytest.approx(regular.duration, abs=0.02)
+
+
 def test_a_drive_after_the_clock_was_set_back_is_learned_as_another_one():
     rows = climb(ROVER, SLOPE, 12.0)[::2]
     again = rows.copy()
