@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives that the ground is learned from: up a plane and over soil by the model; CSV."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -75,8 +74,9 @@ def row_of_plant(plant: Plant, time: float) -> Floats:
     return row
 
 
-ramp = partial(plane, slope_y=0.0, half=3.0)
-"""Returns the plane z = slope x, large enough for a climb."""
+def ramp(slope: float) -> Terrain:
+    """Return the plane z = `slope` x, large enough for a climb."""
+    return plane(slope, 0.0, half=3.0)
 
 
 def write_csv(path: Path, rows: Floats, names: list[str] = NAMES) -> None:

@@ -83,12 +83,17 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
     )  # fmt: skip
 
 
+def wheel_axes(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
+    """Return the axles (6, 3) of the wheels at waypoint i."""
+    return place_rover(rover, prediction, i).axles
+
+
 def contact_frames(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the unit vectors n, t, a of each wheel (6, 3, 3) from attitude and contact angle.
 
     n is the contact normal, a the wheel axis, t = a x n.
     """
-    a = place_rover(rover, prediction, i).axles
+    a = wheel_axes(rover, prediction, i)
     ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP), axis=1)[:, None]
     upward = np.cross(ahead, a)
     angle = prediction.contact_angle[i][:, None]
@@ -181,8 +186,7 @@ def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: in
     The whole width of the wheels of waypoint i is looked at, densely and at all vertices of the
     ground, then around the nearest points.
     """
-    axles = place_rover(rover, prediction, i).axles
-    wheels = zip(prediction.wheel_centres[i], axles, strict=True)
+    wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
     return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
 
 

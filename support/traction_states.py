@@ -7,7 +7,7 @@ from rover_physics import PathPrediction, Rover, Terrain, judge_path
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
 from support.reference_drives import drive_path
-from support.rover_geometry import place_rover
+from support.rover_geometry import wheel_axes
 
 
 def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
@@ -19,7 +19,7 @@ def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
         prediction.rocker_angle[i, 0],
         prediction.bogie_angle[i],
         prediction.contact_angle[i],
-        np.sum(arms * place_rover(rover, prediction, i).axles, axis=1),
+        np.sum(arms * wheel_axes(rover, prediction, i), axis=1),
         prediction.steering_angle[i],
     )
 

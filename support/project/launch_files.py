@@ -11,11 +11,18 @@ from unittest import mock
 
 from support.project.checkout import TOP
 
-MODULES = (
-    "launch", "launch.actions", "launch.launch_description_sources", "launch.substitutions",
-    "launch_ros", "launch_ros.actions", "launch_ros.parameter_descriptions",
-)  # fmt: skip
-"""What launch files import."""
+MODULES = {
+    "launch": ["LaunchContext", "LaunchDescription"],
+    "launch.actions": [
+        "DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription", "OpaqueFunction",
+    ],
+    "launch.launch_description_sources": ["PythonLaunchDescriptionSource"],
+    "launch.substitutions": ["LaunchConfiguration"],
+    "launch_ros": [],
+    "launch_ros.actions": ["Node", "SetRemap"],
+    "launch_ros.parameter_descriptions": ["ParameterValue"],
+}  # fmt: skip
+"""Classes that launch files import, by module."""
 
 
 class Kept(SimpleNamespace):
@@ -31,12 +38,17 @@ class Kept(SimpleNamespace):
 
 @contextlib.contextmanager
 def launch_modules() -> Iterator[None]:
-    """Put stand-ins for launch and launch_ros, with any class, where imports look first."""
+    """Put stand-ins for launch and launch_ros where imports look first."""
     made = {name: ModuleType(name) for name in MODULES}
-    for module in made.values():
-        module.__getattr__ = lambda name: type(name, (Kept,), {})  # type: ignore[method-assign]
+    for name, classes in MODULES.items():
+        vars(made[name]).update({one: type(one, (Kept,), {}) for one in classes})
     with mock.patch.dict(sys.modules, made):
         yield
+
+
+def kind(action: Any) -> str:
+    """Return the name of an action's class."""
+    return type(action).__name__
 
 
 def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
@@ -44,7 +56,7 @@ def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
     with launch_modules():
         names = runpy.run_path(str(TOP / "launch" / name))
     actions = names["generate_launch_description"]().given[0]
-    declared = [action for action in actions if type(action).__name__ == "DeclareLaunchArgument"]
+    declared = [action for action in actions if kind(action) == "DeclareLaunchArgument"]
     assert all(action.description for action in declared)
     defaults = {action.given[0]: action.default_value for action in declared}
     return defaults, [action for action in actions if action not in declared], names
@@ -73,8 +85,7 @@ def simulation_commands(**given: str) -> dict[str, list[str]]:
 def _value(given: Any, values: dict[str, str]) -> Any:
     """Return what an argument stands for: a text, or that of a substitution."""
     while isinstance(given, Kept):
-        is_name = type(given).__name__ == "LaunchConfiguration"
-        given = values[given.given[0]] if is_name else given.given[0]
+        given = values[given.given[0]] if kind(given) == "LaunchConfiguration" else given.given[0]
     return given
 
 

@@ -54,8 +54,10 @@ def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
         child = ChildProcess("stubborn", (), environment, tmp_path / "log")
         children.append(child)
         inner = int(next(child.lines(lambda: None)))
-        assert is_running(inner) and child.running
-    assert not child.running and child.exit_code == -signal.SIGKILL
+        assert is_running(inner)
+        assert child.running
+    assert not child.running
+    assert child.exit_code == -signal.SIGKILL
     wait_until_gone(inner)
 
 
@@ -63,7 +65,9 @@ def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environmen
     child = ChildProcess("failing", (), environment, tmp_path / "log")
     assert list(child.lines(lambda: None)) == []
     wait_until(lambda: not child.running, "its end")
-    assert child.exit_code == 1 and child.last_line() == "no luck today"
+    assert child.exit_code == 1
+    assert child.last_line() == "no luck today"
+    child.stop()
     child.stop()
 
 

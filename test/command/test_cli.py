@@ -132,8 +132,6 @@ def test_a_way_is_written_with_its_predictions_and_predict_passes_it(ground, tmp
     with np.load(out) as way:
         poses = way["poses"]
         assert bool(way["traversable"]) and way["wheel_loads"].shape == (len(poses), 6)
-    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    assert steps.max() < 0.021 and steps.sum() == pytest.approx(report["length"], rel=1e-3)
     assert picture.stat().st_size > 10_000
     words = ["predict", "lsr1", str(ground), str(out), str(tmp_path / "p.npz"), "--friction=0.7"]
     assert main(words) == 0

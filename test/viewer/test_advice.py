@@ -18,7 +18,6 @@ from support.waiting import wait_until
 
 ENDS = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 OPTIONS = PathQueryOptions(count=1, waypoint_spacing=0.05)
-STOPPED = "the search was stopped before it found anything"
 
 
 def slope(x, y):
@@ -85,18 +84,17 @@ def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
         words = describe_advice(advised, True, since + PROMISED)["words"]
         assert words.startswith(f"{found} found so far; the search goes on, tried: ")
     stopped, ended = (describe_advice(one, False, since) for one in (first, last))
-    assert stopped["can_ask"] and stopped["words"] == STOPPED
+    assert stopped["can_ask"]
+    assert stopped["words"] == "the search was stopped before it found anything"
     assert not ended["can_ask"] and ended["words"] == "" and ended["rows"]
 
 
-def test_a_search_that_is_stopped_before_its_first_result_tells_so(page):
+def test_a_search_that_is_stopped_tells_so_and_one_ends_when_nobody_looks_at_its_path(page):
     page.hear({"ask": "advise"})
     page.hear({"ask": "cancel"})
-    wait_until(lambda: page.channel.parts["advice"]["words"] == STOPPED, "the words")
+    words = "the search was stopped before it found anything"
+    wait_until(lambda: page.channel.parts["advice"]["words"] == words, "the words")
     assert page.channel.parts["advice"]["can_ask"] and page._advised.advice is None
-
-
-def test_a_search_ends_when_nobody_looks_at_its_path_any_more(page):
     page.hear({"ask": "advise"})
     wait_until(lambda: page._advice.progress, "the search")
     page.hear({"ask": "value", "label": "friction [-]", "value": 0.7})

@@ -71,18 +71,26 @@ def set_friction(page: Page, friction: float) -> None:
 # The channel.
 
 
-def test_a_browser_gets_all_parts_at_once_and_then_those_that_change_whatever_it_sends(page):
+def test_a_browser_gets_the_files_and_all_parts_at_once_and_then_those_that_change(page):
     with connect(f"ws{page.url[4:]}/channel", origin=page.url) as browser:
         parts = json.loads(browser.recv(timeout=PATIENCE))
         assert {"program", "scene", "subject", "verdict", "paths", "limits", "board"} <= set(parts)
-        for words in ("no JSON", "[1]", "[" * 100_000, '{"ask": ["seek"]}', b"\xff"):
-            browser.send(words)
         browser.send(json.dumps({"ask": "value", "label": FRICTION, "value": 0.3}))
         while "verdict" not in (news := json.loads(browser.recv(timeout=PATIENCE))):
             assert "sliders" not in news
         while parts["verdict"]["passes"]:
             parts |= json.loads(browser.recv(timeout=PATIENCE))
         assert parts["verdict"]["headline"].startswith("friction ")
+
+
+@pytest.mark.parametrize("words", ["no JSON", "[1]", "[" * 100_000, '{"ask": ["seek"]}', b"\xff"])
+def test_what_is_no_question_ends_no_channel(page, words):
+    with connect(f"ws{page.url[4:]}/channel", origin=page.url) as browser:
+        browser.recv(timeout=PATIENCE)
+        browser.send(words)
+        browser.send(json.dumps({"ask": "value", "label": FRICTION, "value": 0.5}))
+        while "verdict" not in json.loads(browser.recv(timeout=PATIENCE)):
+            pass
 
 
 def test_another_site_gets_no_channel(page):

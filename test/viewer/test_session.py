@@ -130,6 +130,8 @@ def test_undo_goes_back_change_by_change_and_never_to_another_rover():
     for friction in (0.7, 0.8):
         session.undo()
         assert session.shown.scenario.rover.friction == friction
+    with pytest.raises(PlanningError, match="no change"):
+        session.undo()
     session.change_rover(FRICTION, 0.6)
     session.take_rover(M2020)
     with pytest.raises(PlanningError, match="no change"):

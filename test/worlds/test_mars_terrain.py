@@ -92,7 +92,8 @@ def test_number_of_rocks_integrates_to_the_area_they_cover(k):
 def test_drawn_rocks_follow_the_size_frequency_law():
     k, area, smallest, largest = 0.1, 20_000.0, 0.1, 2.0
     diameters = rocks.sample_diameters(np.random.default_rng(7), k, area, smallest, largest)
-    assert smallest <= diameters.min() and diameters.max() <= largest
+    assert diameters.min() >= smallest
+    assert diameters.max() <= largest
     for diameter in (0.1, 0.15, 0.2, 0.3, 0.5):
         expected = rocks.cumulative_number(k, np.array([diameter]), largest)[0] * area
         counted = np.sum(diameters >= diameter)
