@@ -90,7 +90,7 @@ class AdviceTopics:
             return refusal("no_path", NOTHING_REFUSED)
         judge, candidate, told = refused.judge, refused.candidate, None
         assert judge is not None and candidate is not None
-        case = case_of(judge, candidate.poses)
+        case = case_of(judge.site, candidate.poses)
         for advice in grow_within(case, lambda: self._desk.give_way(check)):
             if told is None or len(advice.found) > len(told.found):
                 self._node.handover.call(partial(self._publish, advice))

@@ -89,7 +89,7 @@ class Nav2Services:
         if judged.candidate is not None:
             assert judged.judge is not None
             assert isinstance(given, GivenPath) and given.poses is not None
-            spacing = judged.judge.options.waypoint_spacing
+            spacing = judged.judge.site.options.waypoint_spacing
             response.invalid_pose_indices = find_invalid_poses(
                 judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
             )
@@ -135,7 +135,7 @@ def _name_error(judged: PathJudgement) -> str:
         return name
     if chosen.verdict.first_failure == 0:
         return "START_OUTSIDE_MAP"
-    return NO_PATH if judged.judge.terrain.contains(*chosen.poses[-1, :2]) else name
+    return NO_PATH if judged.judge.site.terrain.contains(*chosen.poses[-1, :2]) else name
 
 
 def find_invalid_poses(codes: Sequence[str], given: NDArray[np.intp]) -> list[int]:

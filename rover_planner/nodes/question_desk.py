@@ -133,7 +133,7 @@ class QuestionDesk:
             last_map=self._maps.last_job,
         )
         self._queue.ask(inquiry, values.max_waiting)
-        self._deliver()
+        self._refuse_overdue()  # many questions put the next patrol off
         if self._queue.open_count:
             self._patrol.reset()
 

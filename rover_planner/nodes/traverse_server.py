@@ -151,8 +151,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.get_logger().info(f"ready for rover {name}, {there}")
 
     def _apply_settings(self, settings: ServiceSettings) -> None:
-        self._inputs.values, self.service.settings = self.values, settings
-        self._maps.apply(self.values)
+        before, self.service.settings = self.service.settings, settings
+        self._maps.apply(before.parameters)
         self.watch.apply()
         self.frames.apply_timeout(self.values.transform_timeout)
         self._hazards.apply()

@@ -13,6 +13,7 @@ from rover_planner.planning.goals import Goal
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.rovers import LSR1
@@ -41,7 +42,9 @@ def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_p
 
 def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(tmp_path):
     ground = make_terrain(lambda x, y: 0.0 * x, half=2.0)
-    question = SearchQuery(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), PathQueryOptions())
+    question = SearchQuery(
+        Site(LSR1, ground, PathQueryOptions()), (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+    )
     answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))
     draw_path(tmp_path / "plan.svg", question, answer, "hill.npz")
     text = (tmp_path / "plan.svg").read_text()

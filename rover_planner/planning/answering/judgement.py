@@ -122,9 +122,11 @@ class PathJudgement:
     @cached_property
     def ground(self) -> UnobservedShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
-        if self.candidate is None or self.judge is None or self.judge.unobserved_check is None:
+        if self.candidate is None or self.judge is None:
             return None
-        return self.judge.unobserved_check.share(self.candidate)
+        site = self.judge.site
+        seen = site.unobserved_check.seen
+        return None if seen is None else seen.share(site.rover, self.candidate.poses)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

@@ -207,6 +207,7 @@ def test_a_wrong_joint_map_is_refused_with_its_key(keys, said, tmp_path):
         ),
         ('xyz="0.1 0.3 -0.5"', 'xyz="0.1 0.3"', "PR: xyz is '0.1 0.3'; it must be 3 numbers"),
         ('mass value="10.0"', 'mass value="-1"', "link Body: mass is -1"),
+        ('mass value="10.0"', 'mass value="nan"', "Body: value is 'nan'; it must be a number"),
         ('xyz="0.1 0.3 -0.5"', 'xyz="1e300 0.3 -0.5"', "PR: xyz is '1e300 0.3 -0.5'"),
         ('type="floating"', 'type="hinge"', "joint Root: type is 'hinge'"),
         ('<child link="RockerL"/>', '<child link="RockerX"/>', "'RockerX' is no link"),

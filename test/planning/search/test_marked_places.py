@@ -9,8 +9,14 @@ import pytest
 
 from rover_physics import Terrain, load_rover
 from rover_planner.errors import PlanningError
-from rover_planner.maps.unobserved_ground import ASSUMED, ObservedGround, observed_ground
-from rover_planner.parameters.traverse_server import ALLOW_FOOTPRINT, AUTO, LATTICE, REFUSE
+from rover_planner.maps.unobserved_ground import (
+    ALLOW_FOOTPRINT,
+    ASSUMED,
+    REFUSE,
+    ObservedGround,
+    observed_ground,
+)
+from rover_planner.parameters.traverse_server import AUTO, LATTICE
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import (
@@ -25,6 +31,7 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
 from support.grounds import make_terrain
 from support.paths import poses_at
@@ -137,13 +144,9 @@ def flat_with_hole() -> Terrain:
 def test_goals_near_a_goal_are_over_seen_ground_and_outside_marked_places():
     ground, rover, hole = flat_with_hole(), load_rover("lsr1"), np.array([1.5, 0.0, 0.0])
     seen = observed_ground(ground, None)
-    judge = PathJudge(
-        rover,
-        ground,
-        PathQueryOptions(accepted_chance=1.0),
-        UnobservedCheck(rover, seen, REFUSE),
-        MarkedPlaces((replace(PLACE, x=2.4, radius=0.4),)),
-    )
+    marked = MarkedPlaces((replace(PLACE, x=2.4, radius=0.4),))
+    options, check = PathQueryOptions(accepted_chance=1.0), UnobservedCheck(seen, REFUSE)
+    judge = PathJudge(Site(rover, ground, options, check, marked))
     goals = np.array(
         [goal for ring in judge.goals_near(np.array(START), hole, 0.8) for goal in ring]
     )
@@ -159,10 +162,9 @@ def test_a_search_leads_around_ground_never_seen_until_it_is_seen():
     filled = ObservedGround(unseen.terrain, kinds)
 
     def search(seen: ObservedGround, rule=ALLOW_FOOTPRINT, start=START):
-        check = UnobservedCheck(rover, seen, rule)
         options = PathQueryOptions(waypoint_spacing=0.04)
-        query = SearchQuery(rover, ground, start, GOAL, options, check)
-        return find_path(query, LatticeSettings(budget=60.0), memory)
+        site = Site(rover, ground, options, UnobservedCheck(seen, rule))
+        return find_path(SearchQuery(site, start, GOAL), LatticeSettings(budget=60.0), memory)
 
     around, warm = search(unseen).path.poses, search(filled).path.poses
     assert np.abs(around[:, 1]).max() > 0.2 and np.abs(warm[:, 1]).max() < 0.05
