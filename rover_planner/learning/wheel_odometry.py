@@ -84,7 +84,6 @@ class WheelOdometry:
         self.friction, self.friction_deviation = rover.friction, PRIOR_SPREAD * rover.friction
         """Friction of the ground, as far as it is known, and its standard deviation."""
         self._traction = 0.0
-        """What all wheels pull, over the weight; without torques that is the slope."""
         self.pose = np.zeros(3)
         """x, y [m] and yaw [rad] from where it started."""
         self.speed = 0.0
@@ -93,9 +92,10 @@ class WheelOdometry:
         """Standard deviation of it [m/s]."""
         self.time, self.yaw_rate = math.nan, math.nan
         """Time [s] and yaw rate [rad/s] of the last row; NaN before the first."""
-        self._sums, self._slides = np.zeros(13), np.zeros((2, 2))
-        self._forward_distances, self._noise = self._sums[:8].reshape(2, 2, 2)
-        self._side_distance, self._piece_distances = self._sums[8:10], self._sums[10:]
+        # How far each thing that is not known has moved the place, by 1 of it, x and y [m]: the
+        # two shares that are lost ahead, that gone aside, and the slide ahead and aside.
+        self._shifts, self._noise = np.zeros((5, 2)), np.zeros((2, 2))
+        self._piece_distances = np.zeros(3)  # rolled, times push, times side slope [m]
         self._distance = self._elapsed = 0.0
         self._begin: Floats | None = None
 
@@ -115,16 +115,13 @@ class WheelOdometry:
         if not 0.0 < elapsed < LONGEST_GAP:
             return
         # Plain numbers and few sums: arrays of two elements take several times as long.
-        pitch = float(row[PITCH])
-        slope, aside = -math.tan(pitch), math.tan(row[ROLL])
-        raw = float(ahead.sum()) / len(ahead) * math.cos(pitch)
-        torques = row[TORQUES][np.isfinite(row[TORQUES])]
-        pull = float(torques.sum()) / len(torques) * self._per_torque if len(torques) else slope
-        self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
-        push = self._traction if raw > 0.0 else -self._traction
+        aside = math.tan(row[ROLL])
+        raw = float(ahead.sum()) / len(ahead) * math.cos(row[PITCH])
+        traction = self._find_traction(row, elapsed)
+        push = traction if raw > 0.0 else -traction
         slid, slide, slide_aside = self._find_slide(push, aside)
         rolled = (1.0 - slid) * raw
-        step = rolled * elapsed
+        way, step = raw * elapsed, rolled * elapsed
         everywhere, per_push = self.forward.mean.tolist()
         lost, drift = everywhere + per_push * push, float(self.side.mean[0]) * aside
         self.speed = rolled * (1.0 - lost)
@@ -135,21 +132,30 @@ class WheelOdometry:
         c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
         self.pose[0] += step * ((1.0 - lost) * c + drift * s)
         self.pose[1] += step * ((1.0 - lost) * s - drift * c)
+        self._shifts += np.array([
+            [c * step, s * step],
+            [c * push * step, s * push * step],
+            [-s * aside * step, c * aside * step],
+            [slide * c * way, slide * s * way],
+            [-slide_aside * s * way, slide_aside * c * way],
+        ])  # fmt: skip
         piece = math.copysign(self._piece, step)
         mixed = piece * (along - across) * c * s
         ahead_noise = piece * (along * c**2 + across * s**2)
         aside_noise = piece * (along * s**2 + across * c**2)
-        self._sums += step * np.array([
-            c, c * push, s, s * push,  # forward distances
-            ahead_noise, mixed, mixed, aside_noise,
-            -s * aside, c * aside,  # distance aside
-            1.0, push, aside,  # distances of the piece
-        ])  # fmt: skip
-        self._slides += (
-            raw * elapsed * np.array([[slide * c, slide * s], [-slide_aside * s, slide_aside * c]])
-        )
+        self._noise += step * np.array([[ahead_noise, mixed], [mixed, aside_noise]])
+        self._piece_distances += step * np.array([1.0, push, aside])
         self._elapsed += elapsed
         self._distance += abs(step)
+
+    def _find_traction(self, row: Floats, elapsed: float) -> float:
+        """Return what all wheels pull ahead, over the weight; without torques that is the slope."""
+        pull = -math.tan(row[PITCH])
+        torques = row[TORQUES][np.isfinite(row[TORQUES])]
+        if len(torques):
+            pull = float(torques.sum()) / len(torques) * self._per_torque
+        self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
+        return self._traction
 
     def _find_slide(self, push: float, aside: float) -> tuple[float, float, float]:
         """Return the share of the distance that sliding wheels lose, and its standard deviation.
@@ -204,12 +210,13 @@ class WheelOdometry:
         """Covariance (3, 3) of the pose."""
         yaw = GYRO_NOISE**2 * self._elapsed + (GYRO_BIAS * self._elapsed) ** 2
         across = np.array([-self.pose[1], self.pose[0]])
+        forward, side, slides = self._shifts[:2], self._shifts[2], self._shifts[3:]
         result = np.zeros((3, 3))
         result[:2, :2] = (
             self._noise
-            + self._forward_distances @ self.forward.covariance @ self._forward_distances.T
-            + self.side.covariance[0, 0] * np.outer(self._side_distance, self._side_distance)
-            + self._slides.T @ self._slides
+            + forward.T @ self.forward.covariance @ forward
+            + self.side.covariance[0, 0] * np.outer(side, side)
+            + slides.T @ slides
             + yaw / 3.0 * np.outer(across, across)
         )
         result[2, 2] = yaw
