@@ -149,7 +149,7 @@ class WheelOdometry:
         self._distance += abs(step)
 
     def _find_traction(self, row: Floats, elapsed: float) -> float:
-        """Return what all wheels pull ahead, over the weight; without torques that is the slope."""
+        """Return what all wheels pull, over the weight; without torques that is the slope."""
         pull = -math.tan(row[PITCH])
         torques = row[TORQUES][np.isfinite(row[TORQUES])]
         if len(torques):
