@@ -95,8 +95,9 @@ class WheelOdometry:
         # How far each thing that is not known has moved the place, by 1 of it, x and y [m]: the
         # two shares that are lost ahead, that gone aside, and the slide ahead and aside.
         self._shifts, self._noise = np.zeros((5, 2)), np.zeros((2, 2))
-        self._piece_distances = np.zeros(3)  # rolled, times push, times side slope [m]
-        self._distance = self._elapsed = 0.0
+        self._elapsed = self._distance = 0.0
+        # Sums over the piece of the distance rolled: as it is, times push and times side slope [m].
+        self._rolled = self._pushed = self._leaned = 0.0
         self._begin: Floats | None = None
 
     def take(self, row: Floats, yaw_rate: float) -> None:
@@ -144,9 +145,11 @@ class WheelOdometry:
         ahead_noise = piece * (along * c**2 + across * s**2)
         aside_noise = piece * (along * s**2 + across * c**2)
         self._noise += step * np.array([[ahead_noise, mixed], [mixed, aside_noise]])
-        self._piece_distances += step * np.array([1.0, push, aside])
         self._elapsed += elapsed
         self._distance += abs(step)
+        self._rolled += step
+        self._pushed += step * push
+        self._leaned += step * aside
 
     def _find_traction(self, row: Floats, elapsed: float) -> float:
         """Return what all wheels pull, over the weight; without torques that is the slope."""
@@ -193,14 +196,14 @@ class WheelOdometry:
             if self._begin is not None and np.isfinite(pose).all():
                 self._learn_piece(self._begin, pose)
             self._begin, self._distance = np.array(pose), 0.0
-            self._piece_distances[:] = 0.0
+            self._rolled = self._pushed = self._leaned = 0.0
 
     def _learn_piece(self, begin: Floats, end: Floats) -> None:
         """Learn from a piece of the path between two measured poses."""
         step, yaw = end[:2] - begin[:2], begin[2] + 0.5 * float(wrap(end[2] - begin[2]))
         ahead = float(step @ [np.cos(yaw), np.sin(yaw)])
         left = float(step @ [-np.sin(yaw), np.cos(yaw)])
-        distances = self._piece_distances / self._distance
+        distances = np.array([self._rolled, self._pushed, self._leaned]) / self._distance
         if abs(distances[0]) > 0.9:  # it did not go back and forth
             self.forward.add(distances[:2], distances[0] - ahead / self._distance)
             self.side.add(distances[2:], -left / self._distance)
