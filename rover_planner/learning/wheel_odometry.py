@@ -16,11 +16,11 @@ import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_planner.angles import wrap
 from rover_planner.learning.drive_log import PITCH, RATES, ROLL, STEERING, TIME, TORQUES
 from rover_planner.learning.friction_filter import PRIOR_SPREAD
 from rover_planner.learning.wheel_health import WheelHealth
 from rover_planner.learning.wheel_slip import LONGEST_GAP
-from rover_planner.planning.angles import wrap
 
 FORWARD_PRIOR, SIDE_PRIOR = (0.03, 0.2), (0.2,)
 """Standard deviations before anything was learned: of the share of the distance that is lost
@@ -92,11 +92,11 @@ class WheelOdometry:
         """Standard deviation of it [m/s]."""
         self.time, self.yaw_rate = math.nan, math.nan
         """Time [s] and yaw rate [rad/s] of the last row; NaN before the first."""
-        # How far each thing that is not known has moved the place, by 1 of it, x and y [m]: the
-        # two shares that are lost ahead, that gone aside, and the slide ahead and aside.
+        # How far an error of 1 has moved the place, x and y [m]: of the two shares that are lost
+        # ahead, of that gone aside, of the slides ahead and aside.
         self._shifts, self._noise = np.zeros((5, 2)), np.zeros((2, 2))
         self._elapsed = self._distance = 0.0
-        # Sums over the piece of the distance rolled: as it is, times push and times side slope [m].
+        # Of a piece: the distance that it rolled, times push, times side slope [m].
         self._rolled = self._pushed = self._leaned = 0.0
         self._begin: Floats | None = None
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
-from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import (
     MIN_RADIUS,
     generate_candidates,

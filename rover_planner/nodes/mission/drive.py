@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
 
