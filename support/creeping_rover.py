@@ -7,7 +7,6 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.supervisor import TractionSupervisor
-from rover_planner.traction.traction_service import TractionService
 
 PERIOD = 0.02
 INPUTS = ("joint_states", "imu", "cmd_vel")
@@ -19,16 +18,12 @@ class CreepingRover:
     def __init__(self, command=(0.03, 0.0), enabled=True, **values):
         """Start with the parameters of the controller that differ from their defaults."""
         settings = load_traction_settings(TractionControllerParameters(**values))
-        self.supervisor, self.command = TractionSupervisor(settings, enabled), command
+        self.supervisor = TractionSupervisor(settings, enabled)
+        self.service, self.command = self.supervisor.service, command
         self.now, self.pitch, self.rates, self.updates = 0.0, 0.0, np.zeros(3), []
         self.positions = dict.fromkeys((*SUSPENSION_JOINTS, *STEERING_JOINTS), 0.0)
         self.velocities = dict.fromkeys(SUSPENSION_JOINTS, 0.0)
         self.turn_wheels(0.2)
-
-    @property
-    def service(self) -> TractionService:
-        """The service of the supervisor."""
-        return self.supervisor.service
 
     def turn_wheels(self, rate):
         """Turn all wheels at a rate [rad/s]."""

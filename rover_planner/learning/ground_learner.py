@@ -207,8 +207,10 @@ class GroundLearner:
             return False
         elapsed, self._time, new = time - last, time, False
         if not 0.0 <= elapsed <= LONGEST_GAP or self._jumps(row):
-            self._begin()
-            elapsed = 0.0
+            elapsed, self._block_end = 0.0, np.inf
+            self._windows.begin()
+            self._recent.clear()
+            self._slipping[:] = 0
         else:
             self._health.take(row)
         is_full = time >= self._block_end - 1e-9
@@ -229,12 +231,6 @@ class GroundLearner:
         self._place = self._time, x, y
         most = 2.0 * wheel.max_speed * wheel.radius * (self._time - before)
         return not math.hypot(x - last_x, y - last_y) <= most + JUMP
-
-    def _begin(self) -> None:
-        self._block_end = np.inf
-        self._windows.begin()
-        self._recent.clear()
-        self._slipping[:] = 0
 
     def _think(self, block: Any) -> bool:
         """Take a block of measurements, _SUMS; return whether it ends a window."""

@@ -84,6 +84,7 @@ class WheelOdometry:
         self.friction, self.friction_deviation = rover.friction, PRIOR_SPREAD * rover.friction
         """Friction of the ground, as far as it is known, and its standard deviation."""
         self._traction = 0.0
+        """What all wheels pull, over the weight; without torques that is the slope."""
         self.pose = np.zeros(3)
         """x, y [m] and yaw [rad] from where it started."""
         self.speed = 0.0
@@ -116,10 +117,13 @@ class WheelOdometry:
         if not 0.0 < elapsed < LONGEST_GAP:
             return
         # Plain numbers and few sums: arrays of two elements take several times as long.
-        aside = math.tan(row[ROLL])
-        raw = float(ahead.sum()) / len(ahead) * math.cos(row[PITCH])
-        traction = self._find_traction(row, elapsed)
-        push = traction if raw > 0.0 else -traction
+        pitch = float(row[PITCH])
+        slope, aside = -math.tan(pitch), math.tan(row[ROLL])
+        raw = float(ahead.sum()) / len(ahead) * math.cos(pitch)
+        torques = row[TORQUES][np.isfinite(row[TORQUES])]
+        pull = float(torques.sum()) / len(torques) * self._per_torque if len(torques) else slope
+        self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
+        push = self._traction if raw > 0.0 else -self._traction
         slid, slide, slide_aside = self._find_slide(push, aside)
         rolled = (1.0 - slid) * raw
         way, step = raw * elapsed, rolled * elapsed
@@ -150,15 +154,6 @@ class WheelOdometry:
         self._rolled += step
         self._pushed += step * push
         self._leaned += step * aside
-
-    def _find_traction(self, row: Floats, elapsed: float) -> float:
-        """Return what all wheels pull, over the weight; without torques that is the slope."""
-        pull = -math.tan(row[PITCH])
-        torques = row[TORQUES][np.isfinite(row[TORQUES])]
-        if len(torques):
-            pull = float(torques.sum()) / len(torques) * self._per_torque
-        self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
-        return self._traction
 
     def _find_slide(self, push: float, aside: float) -> tuple[float, float, float]:
         """Return the share of the distance that sliding wheels lose, and its standard deviation.

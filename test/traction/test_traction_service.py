@@ -11,8 +11,7 @@ from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_planner.parameters.traction_controller import COAST, TractionControllerParameters
 from rover_planner.traction.settings import load_traction_settings
-from rover_planner.traction.supervisor import RECOVERY_TIME, TractionSupervisor
-from rover_planner.traction.traction_service import TractionService
+from rover_planner.traction.supervisor import RECOVERY_TIME
 from support.creeping_rover import PERIOD, CreepingRover
 from support.rough_grounds import plane
 from support.rovers import FIXED, LSR1
@@ -20,10 +19,6 @@ from support.rovers import FIXED, LSR1
 STEERED = steering_joints(LSR1)
 AGAIN = RECOVERY_TIME + 3 * PERIOD
 """Time after which it drives again once all is right [s]."""
-
-
-def settings(**values):
-    return load_traction_settings(TractionControllerParameters(rest_policy=COAST, **values))
 
 
 class Rig(CreepingRover):
@@ -112,7 +107,7 @@ def test_an_impossible_measurement_is_a_fault_that_names_it(kind, name, value, t
 
 
 def test_commands_are_reduced_to_what_the_wheels_can_do():
-    service = TractionService(settings())
+    service = Rig().service
     service.take_command(5.0, 0.0, 0.0)
     assert service.wanted == pytest.approx((0.1, 0.0))
     service.take_command(-0.1, 1.0, 0.0)
@@ -159,10 +154,11 @@ def test_it_pushes_up_a_slope_with_the_weight_along_it_within_a_third_of_a_secon
 
 def test_a_rover_with_steering_asks_for_its_joints_and_guesses_nothing():
     rig = Rig()
-    rig.supervisor = TractionSupervisor(replace(settings(), rover=FIXED), enabled=True)
+    steered = rig.service.settings
+    rig.supervisor.configure(replace(steered, rover=FIXED))
     known = {name: rig.positions.pop(name) for name in STEERED}
     assert rig.run(0.1).fault == ""
-    rig.supervisor.configure(settings())
+    rig.supervisor.configure(steered)
     update = rig.run(PERIOD)
     assert not update.torques.any()
     assert update.fault == f"waiting for joint_states (no position of {', '.join(STEERED)})"
@@ -191,7 +187,7 @@ def test_straight_wheels_do_not_push_a_rover_that_is_to_turn_on_the_spot():
 
 def test_a_command_beyond_the_steering_limit_is_named_and_not_driven():
     rig, narrow = Rig((0.0, 0.1)), replace(LSR1, steering=replace(LSR1.steering, limit=0.4))
-    rig.supervisor = TractionSupervisor(replace(settings(), rover=narrow), enabled=True)
+    rig.supervisor.configure(replace(rig.service.settings, rover=narrow))
     rig.turn_wheels(0.0)
     update = rig.run(0.1)
     assert "steering angle of" in update.warning and not update.torques.any()

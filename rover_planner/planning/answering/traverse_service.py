@@ -3,8 +3,8 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.names import SUSPENSION_JOINTS
@@ -24,14 +24,11 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 MAX_AGE = 1.0
 """Age up to which a measurement counts as one of now [s]."""
 
-Value = TypeVar("Value")
 
-
-@dataclass(frozen=True)
-class Measured(Generic[Value]):
+class Measured(NamedTuple):
     """What was measured, and when [s]."""
 
-    value: Value
+    value: Any
     time: float
 
 
@@ -56,9 +53,9 @@ class TraverseService:
         self._ground: LearnedGround | None = None
         self._assumed: tuple[ServiceSettings, LearnedGround | None, ServiceSettings] | None = None
         self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
-        self._joints: dict[str, Measured[float]] = {}
-        self._pose: Measured[Floats] | None = None
-        self._tilt: Measured[tuple[float, float]] | None = None
+        self._joints: dict[str, Measured] = {}
+        self._pose: Measured | None = None
+        self._tilt: Measured | None = None
 
     @property
     def terrain(self) -> Terrain | None:
@@ -84,7 +81,7 @@ class TraverseService:
         """Keep roll and pitch [rad] of the body, measured by an IMU."""
         self._tilt = Measured((roll, pitch), self._clock())
 
-    def _is_recent(self, *measured: Measured[Any], max_age: float = MAX_AGE) -> bool:
+    def _is_recent(self, *measured: Measured, max_age: float = MAX_AGE) -> bool:
         """Return whether no measurement is older than `max_age` [s]."""
         return self._clock() - min(one.time for one in measured) <= max_age
 
