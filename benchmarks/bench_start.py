@@ -18,7 +18,6 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 STARTS = 5
 """Warm starts, of which the median counts."""
-COLD_STARTS = 1
 WAYPOINTS = 300
 """Waypoints of the path that the command line judges."""
 
@@ -30,7 +29,7 @@ def measure() -> list[Figure]:
     warm, memory = (statistics.median(values) for values in zip(*starts, strict=True))
     return [
         Figure("start", "to the first answer, kernels cached", warm, "s", 2.0, repeats=STARTS),
-        *(measure_cold_start() for _ in range(COLD_STARTS)),
+        measure_cold_start(),
         Figure("start", "peak memory of the server", memory, "MB", 400.0, repeats=STARTS),
         measure_command(),
     ]

@@ -23,6 +23,7 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import FOUND, OUT_OF_TIME, SearchResult, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -56,7 +57,7 @@ def search(
     """Search a path; CPU time is its clock, so that other programs do not cut its budget."""
     settings = LatticeSettings(budget=budget, ends_at_first=ends_at_first)
     with mock.patch("time.perf_counter", time.process_time):
-        return find_path(SearchQuery(ROVER, terrain, *pair, OPTIONS), settings, memory)
+        return find_path(SearchQuery(Site(ROVER, terrain, OPTIONS), *pair), settings, memory)
 
 
 def draw_pairs(terrain: Terrain, count: int) -> list[Pair]:
@@ -79,7 +80,7 @@ def draw_standing(terrain: Terrain, rng: np.random.Generator) -> Iterator[NDArra
     xmin, xmax, ymin, ymax = terrain.bounds
     while True:
         poses = rng.uniform((xmin, ymin, -np.pi), (xmax, ymax, np.pi), (DRAWN, 3))
-        codes = PathJudge(ROVER, terrain, OPTIONS).stand(poses)
+        codes = PathJudge(Site(ROVER, terrain, OPTIONS)).stand(poses)
         stands = np.array([code == "" for code in codes])
         if not stands.any():
             raise ValueError(f"the rover stands at none of {DRAWN} poses")

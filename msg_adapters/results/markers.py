@@ -13,17 +13,17 @@ from rover_physics.numerics.quaternions import xyzw_from_yaw
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.traversability import classification
 
-PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
-WITH_SPEED_SERVOS = ColorRGBA(r=0.65, g=0.80, b=0.15, a=1.0)
-WITH_TRACTION_CONTROL = ColorRGBA(r=0.95, g=0.65, b=0.10, a=1.0)
-IMPASSABLE = ColorRGBA(r=0.85, g=0.15, b=0.10, a=1.0)
-CONTACT = ColorRGBA(r=0.15, g=0.35, b=0.85, a=0.8)
+GREEN = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
+LIME = ColorRGBA(r=0.65, g=0.80, b=0.15, a=1.0)
+ORANGE = ColorRGBA(r=0.95, g=0.65, b=0.10, a=1.0)
+RED = ColorRGBA(r=0.85, g=0.15, b=0.10, a=1.0)
+BLUE = ColorRGBA(r=0.15, g=0.35, b=0.85, a=0.8)
 
 _COLOURS = {
-    classification.PASSABLE: PASSABLE,
-    classification.WITH_SPEED_SERVOS: WITH_SPEED_SERVOS,
-    classification.WITH_TRACTION_CONTROL: WITH_TRACTION_CONTROL,
-    classification.IMPASSABLE: IMPASSABLE,
+    classification.PASSABLE: GREEN,
+    classification.WITH_SPEED_SERVOS: LIME,
+    classification.WITH_TRACTION_CONTROL: ORANGE,
+    classification.IMPASSABLE: RED,
 }
 _LINE_WIDTH = 0.05
 _CONTACT_SIZE = 0.04
@@ -56,14 +56,12 @@ def path_markers(
     path.points = _points(positions[rows])
     path.colors = [_colour(*outcome) for outcome in outcomes]
     contacts = prediction.contact_points[rows[prediction.settled[rows]]].reshape(-1, 3)
-    spheres = _marker("contact_points", Marker.SPHERE_LIST, header, 3 * (_CONTACT_SIZE,), CONTACT)
+    spheres = _marker("contact_points", Marker.SPHERE_LIST, header, 3 * (_CONTACT_SIZE,), BLUE)
     spheres.points = _points(contacts[np.isfinite(contacts).all(axis=1)])
     markers.markers += [path, spheres]
     for first in failures[:1]:
-        arrow = _marker("failing_pose", Marker.ARROW, header, (0.6, 0.1, 0.1), IMPASSABLE)
-        text = _marker(
-            "reason", Marker.TEXT_VIEW_FACING, header, (0.0, 0.0, _TEXT_HEIGHT), IMPASSABLE
-        )
+        arrow = _marker("failing_pose", Marker.ARROW, header, (0.6, 0.1, 0.1), RED)
+        text = _marker("reason", Marker.TEXT_VIEW_FACING, header, (0.0, 0.0, _TEXT_HEIGHT), RED)
         arrow.pose.position, text.pose.position = _points(positions[[first, first]])
         turn = arrow.pose.orientation
         turn.x, turn.y, turn.z, turn.w = xyzw_from_yaw(float(prediction.poses[first, 2]))
@@ -75,13 +73,7 @@ def path_markers(
 
 def _colour(reason: str, traversability_class: str) -> ColorRGBA:
     """Return the colour of a waypoint by its class, or by its reason if the class is unknown."""
-    return (
-        _COLOURS[traversability_class]
-        if traversability_class
-        else IMPASSABLE
-        if reason
-        else PASSABLE
-    )
+    return _COLOURS[traversability_class] if traversability_class else RED if reason else GREEN
 
 
 def cleared_markers(header: Header) -> MarkerArray:

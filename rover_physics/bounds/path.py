@@ -38,7 +38,7 @@ from rover_physics.prediction.packed_model import PackedModel, forget_models
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.results.path_prediction import (
     BOUNDED_VALUES,
-    BOUNDS,
+    WAYPOINT_BOUNDS,
     PathBounds,
     PathPrediction,
 )
@@ -150,7 +150,7 @@ def forget_terrains() -> None:
 def find_bounds(
     model: PackedModel, grounds: tuple[Ground, Ground, Ground], poses: np.ndarray, results: Any
 ) -> Any:
-    """Bound the prediction at poses; return BOUNDS (n,).
+    """Bound the prediction at poses; return WAYPOINT_BOUNDS (n,).
 
     Args:
         model: The model on the nominal ground.
@@ -159,7 +159,7 @@ def find_bounds(
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         results: (n,) RESULTs on the nominal ground; the wheels are steered along their motions.
     """
-    bounds = np.zeros(len(poses), BOUNDS).view(np.recarray)
+    bounds = np.zeros(len(poses), WAYPOINT_BOUNDS).view(np.recarray)
     for name in BOUNDED_VALUES:
         bounds[name] = np.nan
     works = np.zeros(min(MAX_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
@@ -186,7 +186,7 @@ def bound_poses(uncertains, places, works, bounds, part):
         uncertains: (1,) UNCERTAIN.
         places: (n, 3) poses, (n, 3) their motions, and (n,) RESULTs on the nominal ground.
         works: (chunks,) BOUNDS_WORK.
-        bounds: (n,) BOUNDS, written.
+        bounds: (n,) WAYPOINT_BOUNDS, written.
         part: The first chunk and the one after the last.
     """
     (poses, motions, results), chunks = places, works.size
@@ -199,7 +199,7 @@ def bound_poses(uncertains, places, works, bounds, part):
 
 @kernel
 def bound_pose(uncertain, nominal, work, result):
-    """Bound the pose of `work` with a RESULT into `result`, a BOUNDS; return its BoundStatus."""
+    """Bound the pose of `work` with a RESULT; write WAYPOINT_BOUNDS, return a BoundStatus."""
     model, spread, box = uncertain.nominal, work.spread, work.box
     if nominal.status != PoseStatus.SETTLED:
         return BoundStatus.NOT_SETTLED

@@ -167,7 +167,9 @@ def look_along_rim(search, rim, corner, heading, shape):
     s0, t0 = corner
     ex, ey = heading
     a, b, c, d = shape
-    s, turn = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R), 0.0
+    low, high = s0 + min(ex, 0.0) + min(ey, 0.0), s0 + max(ex, 0.0) + max(ey, 0.0)
+    low, high = max(low, -R), min(high, R)
+    s, turn = min(max(0.5 * (low + high), -FIRST * R), FIRST * R), 0.0
     q = np.sqrt(R * R - s * s)
     for step in range(RIM_STEPS):
         aside = rim * search.half_width + sine * q - t0
@@ -176,8 +178,7 @@ def look_along_rim(search, rim, corner, heading, shape):
         ahead, up = along_u * ex + along_v * ey, sine * (along_v * ex - along_u * ey) + inverse
         intrusion = a + b * u + c * v + d * u * v + q * inverse
         if step == 0:
-            low, high = s0 + min(ex, 0.0) + min(ey, 0.0), s0 + max(ex, 0.0) + max(ey, 0.0)
-            most = intrusion + _gain_on_rim(R, (s, q), (ahead, up), (max(low, -R), min(high, R)))
+            most = intrusion + _gain_on_rim(R, (s, q), (ahead, up), (low, high))
             bend = abs(d) * (0.5 + abs(u - 0.5)) * (0.5 + abs(v - 0.5))
             if most + bend <= search.best_on_rim:
                 return

@@ -162,12 +162,12 @@ def _slip_ratio(servo, wheel):
 
 @kernel
 def solve_servo(linkage, work, servo):
-    """Find loads, forces and motion of a rover with speed servos; write them into a SERVO.
+    """Find loads, forces and motion of a rover with speed servos; write them into a SERVO_STATE.
 
     Args:
         linkage: LINKAGE.
         work: WORK with placement, contacts and the equations of `write_equations`.
-        servo: SERVO with nominal motion, friction or soils, droop, full_traction and
+        servo: SERVO_STATE with nominal motion, friction or soils, droop, full_traction and
             max_traction.
 
     Returns:

@@ -37,7 +37,7 @@ FLUSH = 0.02
 """Angle [rad] between axle and ground from which a wheel stands on its rim; a flush wheel has its
 whole width on the ground."""
 
-SERVO = record_type(
+SERVO_STATE = record_type(
     ("X", float, (UNKNOWNS, COLUMNS)),  # loads and missing forces per unit of wheel force
     ("M", float, (UNKNOWNS, UNKNOWNS)),  # work space: loads and base forces in the equilibrium
     ("base", float, (6, 2, MOTIONS)),  # level velocity of wheels along and across for unit motions
@@ -85,14 +85,14 @@ over the nominal speed, turning rates in rad per TURN_DISTANCE of nominal distan
 
 @kernel
 def find_motions(linkage, placement, contacts, balance, servo):
-    """Write the motions and the equilibrium into a SERVO; return False if it is singular.
+    """Write the motions and the equilibrium into a SERVO_STATE; return False if it is singular.
 
     Args:
         linkage: LINKAGE.
         placement: PLACEMENT.
         contacts: CONTACTS.
         balance: BALANCE with the equations of `write_equations`.
-        servo: SERVO; `nominal` is read, and X, base, velocity, command and spread are written.
+        servo: SERVO_STATE; `nominal` is read; X, base, velocity, command and spread are written.
     """
     X = servo.X
     _write_base(placement, TURN_DISTANCE * linkage.radius, servo)

@@ -47,12 +47,12 @@ FASTEST = 20.0
 
 @kernel
 def roll_on_soil(servo, wheel, velocity):
-    """Write forces, their derivatives and the slip of a wheel on soil into a SERVO.
+    """Write forces, their derivatives and the slip of a wheel on soil into a SERVO_STATE.
 
     In the derivatives the load itself, over the rover's weight, takes the place of mu N.
 
     Args:
-        servo: SERVO with `pressing`, the load of the wheel, `soil`, `command`, `droop` and
+        servo: SERVO_STATE with `pressing`, the load of the wheel, `soil`, `command`, `droop` and
             `max_traction`.
         wheel: Index of the wheel.
         velocity: (ALONG, ACROSS, SPIN) of the contact as if the wheel did not turn.
@@ -279,7 +279,7 @@ def _write_forces(servo, wheel, state, signed, ends):
     implicit function theorem for the rim's speed.
 
     Args:
-        servo: SERVO.
+        servo: SERVO_STATE.
         wheel: Index of the wheel.
         state: Strength of `_bear_load`, and 1.0 while the servo is not saturated, else 0.0.
         signed: Resistance against the travel, and its derivatives by travel and load.

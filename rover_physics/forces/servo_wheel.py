@@ -28,10 +28,10 @@ of the two points' velocities, and mu N."""
 
 @kernel
 def roll_wheel(servo, wheel, grip, velocity):
-    """Write forces, their derivatives and the slip of a wheel into a SERVO.
+    """Write forces, their derivatives and the slip of a wheel into a SERVO_STATE.
 
     Args:
-        servo: SERVO with `command`, `droop`, `max_traction` and `creep`.
+        servo: SERVO_STATE with `command`, `droop`, `max_traction` and `creep`.
         wheel: Index of the wheel.
         grip: mu N; a wheel with none has no forces.
         velocity: (ALONG, ACROSS, SPIN) of the contact as if the wheel did not turn.

@@ -23,7 +23,7 @@ SOIL_MODEL, SOIL_FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULU
 """Columns of the table of `pack_soils`."""
 COULOMB, BEKKER_WONG = 0.0, 1.0
 """Values of the column SOIL_MODEL."""
-MIN_FRICTION = 1e-3
+MIN_PULL = 1e-3
 """Least effective friction, for wheels without drawbar pull; above 0 because it is a divisor."""
 MAX_NEWTON_STEPS = 50
 """Largest number of Newton steps of `find_mobilisation`."""
@@ -137,23 +137,23 @@ def solve_wheel(soil, wheel, N, T, S):
 
 @kernel
 def effective_friction(soil, wheel, N):
-    """Return the largest drawbar pull over the load N [N], at least MIN_FRICTION.
+    """Return the largest drawbar pull over the load N [N], at least MIN_PULL.
 
     All forces with sqrt(T^2 + S^2) up to this coefficient times N are within the soil's strength,
-    unless MIN_FRICTION applies. For Bekker-Wong it depends on the load. `soil` is a row of
+    unless MIN_PULL applies. For Bekker-Wong it depends on the load. `soil` is a row of
     `pack_soils`, `wheel` a SoilWheel.
     """
     if soil[SOIL_MODEL] == COULOMB:
         return _own_friction(soil, wheel.friction)
     if not N > 0.0:
-        return MIN_FRICTION
+        return MIN_PULL
     strength, resistance = grip_on(soil, wheel, N)
-    return max(strength - resistance, MIN_FRICTION)
+    return max(strength - resistance, MIN_PULL)
 
 
 @kernel
 def grip_on(soil, wheel, N):
-    """Return the thrust at slip 1, at least MIN_FRICTION, and the resistance, over the load N [N].
+    """Return the thrust at slip 1, at least MIN_PULL, and the resistance, over the load N [N].
 
     `soil` is a row of `pack_soils`, `wheel` a SoilWheel.
     """
@@ -163,7 +163,7 @@ def grip_on(soil, wheel, N):
     length = contact_length(wheel.radius, sinkage)
     strength = shear_strength(soil, wheel.width * length, N)
     thrust = _largest_thrust(soil, wheel.radius, sinkage, length, strength)
-    return max(thrust / N, MIN_FRICTION), motion_resistance(soil, wheel.width, sinkage) / N
+    return max(thrust / N, MIN_PULL), motion_resistance(soil, wheel.width, sinkage) / N
 
 
 @kernel

@@ -10,7 +10,7 @@ from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS, WHEEL_SA
 from rover_physics.contact.settling import settle
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
 from rover_physics.forces.servo import balance_servos, write_servo_forces
-from rover_physics.forces.servo_motion import SERVO
+from rover_physics.forces.servo_motion import SERVO_STATE
 from rover_physics.forces.soil import SoilWheel, coulomb_slip, effective_friction, solve_wheel
 from rover_physics.forces.soil_sharing import rolling_direction, share_forces_on_soil
 from rover_physics.forces.stability import CORNERS, find_support, tip_over_angles
@@ -72,7 +72,7 @@ WORK = record_type(
     ("cells", CELL_SEARCH),  # search between the rims of a wheel
     ("balance", BALANCE),  # forces as linear functions of the torques
     ("search", TORQUE_SEARCH),  # the chosen forces
-    ("servo", SERVO),  # forces and motion under policy SERVO
+    ("servo", SERVO_STATE),  # forces and motion under policy SERVO
     ("J", float, (6, 6)),  # derivatives of the gaps by q
     ("step", float, (6, 1)),  # Newton step
     ("lifts", float, (6, 6)),  # changes of q, one column for each wheel, that raise this wheel

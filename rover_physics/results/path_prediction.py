@@ -22,7 +22,7 @@ from rover_physics.status import BoundStatus, PoseStatus
 
 _NAMES = (*(one.name for one in QUANTITIES), *VIEWS)
 
-BOUNDS = record_type(
+WAYPOINT_BOUNDS = record_type(
     ("status", np.int8),  # a BoundStatus
     ("roll", float, (2,)),  # [rad]
     ("pitch", float, (2,)),  # [rad]
@@ -39,13 +39,13 @@ BOUNDS = record_type(
 
 The torques of policy "optimal" follow the ground, so that a load has no upper bound.
 """
-BOUNDED_VALUES = tuple(name for name in BOUNDS.names or () if name != "status")
+BOUNDED_VALUES = tuple(name for name in WAYPOINT_BOUNDS.names or () if name != "status")
 """Names of the bounded values."""
 
 
 @dataclass(frozen=True, eq=False)
 class PathBounds:
-    """Bounds at n waypoints: its attributes are the arrays (n, ..., 2) of BOUNDS, and more.
+    """Bounds at n waypoints: the arrays (n, ..., 2) of WAYPOINT_BOUNDS as attributes, and more.
 
     The last axis holds smallest and largest value. A waypoint without bounds has NaN. All arrays
     are read-only.
@@ -54,13 +54,13 @@ class PathBounds:
     sigmas: float
     """Number of standard deviations by which the map's heights may be wrong."""
     values: Any
-    """(n,) BOUNDS of each waypoint."""
+    """(n,) WAYPOINT_BOUNDS of each waypoint."""
 
     def __post_init__(self) -> None:
         freeze_fields(self)
 
     def __getattr__(self, name: str) -> Any:
-        if name in (BOUNDS.names or ()):
+        if name in (WAYPOINT_BOUNDS.names or ()):
             return self.values[name]
         raise AttributeError(f"a PathBounds has no {name!r}; it has {', '.join(BOUNDED_VALUES)}")
 

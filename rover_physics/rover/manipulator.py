@@ -10,8 +10,9 @@ from rover_physics.errors import ModelError
 from rover_physics.numerics.plausible import MAX_FORCE, MAX_MASS
 from rover_physics.rover.model import Manipulator, Rover
 
-JOINT_TOLERANCE = 1e-6
-"""Excess of an angle over the limit of its joint [rad] that counts as rounding."""
+ROUNDING = 1e-6
+"""Excess of an angle over a joint's limit [rad], and of a distance over the arm's reach [m], that
+counts as rounding."""
 
 
 def link_points(arm: Manipulator, angles: np.ndarray) -> np.ndarray:
@@ -43,15 +44,17 @@ def distance_to_reach(arm: Manipulator, point: ArrayLike) -> float:
     _, upper, fore = arm.link_lengths
     with np.errstate(over="ignore"):  # a point so far away is infinitely far
         distance = float(np.linalg.norm(_from_shoulder(arm, point)))
-    return max(distance - (upper + fore), 0.0) + min(distance - abs(upper - fore), 0.0)
+    gap = max(distance - (upper + fore), 0.0) + min(distance - abs(upper - fore), 0.0)
+    return gap if abs(gap) > ROUNDING else 0.0
 
 
 def inverse_kinematics(arm: Manipulator, point: ArrayLike) -> list[np.ndarray]:
     """Return the joint angles (3,) [rad] that bring the tip to a point (3,) [m], body frame.
 
-    Elbow up comes first, then elbow down; the arm faces the point. Angles are from -pi to pi, or
-    shifted by a full turn if this brings them within the joint's limits. Solutions beyond the
-    joint limits are left out; the list is empty if the point is out of reach.
+    Elbow up comes first, then elbow down. The arm faces the point; if that is beyond the joint
+    limits it turns away and reaches over its back, with its links in the same places. Angles are
+    from -pi to pi, or shifted by a full turn if this brings them within the joint's limits.
+    Solutions beyond the joint limits are left out; the list is empty if the point is out of reach.
     """
     if distance_to_reach(arm, point) != 0.0:
         return []
@@ -67,8 +70,10 @@ def inverse_kinematics(arm: Manipulator, point: ArrayLike) -> list[np.ndarray]:
     for elbow in (bend, -bend):
         inner = np.arctan2(fore * np.sin(elbow), upper + fore * np.cos(elbow))
         shoulder = np.arctan2(-z, away) - inner
-        solutions.append(_within_limits(arm, np.array([yaw, shoulder, elbow])))
-    return [angles for angles in solutions if angles is not None]
+        facing, over_back = (yaw, shoulder, elbow), (yaw + np.pi, np.pi - shoulder, -elbow)
+        fitting = [_within_limits(arm, np.array(angles)) for angles in (facing, over_back)]
+        solutions += [angles for angles in fitting if angles is not None][:1]
+    return solutions
 
 
 def _from_shoulder(arm: Manipulator, point: ArrayLike) -> np.ndarray:
@@ -80,7 +85,7 @@ def _within_limits(arm: Manipulator, angles: np.ndarray) -> np.ndarray | None:
     angles = (angles + np.pi) % (2.0 * np.pi) - np.pi
     for k, (low, high) in enumerate(arm.joint_limits or ()):
         turns = angles[k] + 2.0 * np.pi * np.array([0.0, -1.0, 1.0])
-        fits = turns[(turns >= low) & (turns <= high)]
+        fits = turns[(turns >= low - ROUNDING) & (turns <= high + ROUNDING)]
         if not fits.size:
             return None
         angles[k] = fits[0]
@@ -187,7 +192,7 @@ def arm_angles(arm: Manipulator, joint_angles: Mapping[str, float] | None) -> np
         if not np.isfinite(angle):
             raise ModelError(f"angle of joint {name!r} is {angle}; it must be finite, in rad")
     for k, (low, high) in enumerate(arm.joint_limits or ()):
-        if not low - JOINT_TOLERANCE <= angles[k] <= high + JOINT_TOLERANCE:
+        if not low - ROUNDING <= angles[k] <= high + ROUNDING:
             raise ModelError(
                 f"angle of joint {arm.joints[k]!r} is {angles[k]:.6g}; it must be within "
                 f"{low:g} to {high:g} rad"

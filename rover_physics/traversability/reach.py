@@ -15,7 +15,12 @@ from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.manipulator import as_vector, distance_to_reach, inverse_kinematics
+from rover_physics.rover.manipulator import (
+    ROUNDING,
+    as_vector,
+    distance_to_reach,
+    inverse_kinematics,
+)
 from rover_physics.rover.model import Manipulator, Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_poses
@@ -171,7 +176,7 @@ def _describe_limits(arm: Manipulator, local: np.ndarray) -> str:
     beyond = []
     for angles in inverse_kinematics(replace(arm, joint_limits=None), local):
         for k, (low, high) in enumerate(arm.joint_limits or ()):
-            if not low <= angles[k] <= high:
+            if not low - ROUNDING <= angles[k] <= high + ROUNDING:
                 beyond.append(
                     f"{arm.joints[k]} at {angles[k]:.2f} rad, limits {low:.2f} to {high:.2f} rad"
                 )

@@ -45,7 +45,7 @@ EXTREMES = {
     "max_sinkage": ("sinkage", np.fmax),
 }
 """Fields of a verdict that are the extreme of a quantity, and which of two values is worse."""
-BOUNDS = {
+BOUND_EXTREMES = {
     "tip_over_ratio_bound": np.fmin,
     "friction_utilisation_bound": np.fmax,
     "torque_saturation_bound": np.fmax,
@@ -253,7 +253,7 @@ def refuse_worst_case(
                 codes[i] = NOT_COMPUTABLE
                 reasons[i] = f"{name} cannot be computed {within}: a bound is not a number"
     extremes: dict[str, Any] = {}
-    for name, worse in BOUNDS.items():
+    for name, worse in BOUND_EXTREMES.items():
         quantity, end = name.removesuffix("_bound"), 0 if worse is np.fmin else 1
         rows = needed if quantity in EXEMPT_ON_EDGE else bounds.bounded
         values = getattr(bounds, quantity)[rows][..., end]
@@ -319,7 +319,11 @@ def _sum_up(codes: Sequence[str], reasons: Sequence[str]) -> dict[str, Any]:
 
 def worst_of(verdict: Verdict, other: Verdict) -> Verdict:
     """Return a verdict with the worse of two verdicts' extremes; the rest is the second's."""
-    worse = {name: choose for name, (_, choose) in EXTREMES.items()} | BOUNDS | {"risk": np.fmax}
+    worse = (
+        {name: choose for name, (_, choose) in EXTREMES.items()}
+        | BOUND_EXTREMES
+        | {"risk": np.fmax}
+    )
     extremes = {
         name: float(choose(getattr(verdict, name), getattr(other, name)))
         for name, choose in worse.items()

@@ -26,10 +26,10 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
-from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.unobserved_check import UnobservedCheck
+from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.unobserved_check import NONE_REFUSED, UnobservedCheck
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
@@ -57,8 +57,8 @@ class Case:
     """Standard deviations by which the map's heights may be wrong."""
     accepted_chance: float = ACCEPTED_CHANCE
     """Largest chance of failure of a path that passes."""
-    unobserved_check: UnobservedCheck | None = None
-    """Refuses ground under the belly that was never seen; None allows it."""
+    unobserved_check: UnobservedCheck = NONE_REFUSED
+    """Refuses ground under the belly that was never seen."""
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
 
@@ -66,6 +66,17 @@ class Case:
     def spacing(self) -> float:
         """Distance between waypoints of a path that is made anew [m]."""
         return SPACING * self.rover.wheel.radius
+
+    @property
+    def site(self) -> Site:
+        """The rover on the ground, with the options of a path that is made anew."""
+        options = PathQueryOptions(
+            waypoint_spacing=self.spacing,
+            model=self.options,
+            map_sigmas=self.sigmas,
+            accepted_chance=self.accepted_chance,
+        )
+        return Site(self.rover, self.terrain, options, self.unobserved_check, self.marked)
 
     def change(self, **options: Any) -> "Case":
         """Return the case with other options."""
@@ -86,10 +97,8 @@ class Case:
             stop_at_failure=True,
             accepted_chance=self.accepted_chance,
         )
-        path = Candidate(self.poses, *judged)
-        if self.unobserved_check is not None:
-            path = self.unobserved_check.hold(path)
-        return JudgedCase(self, path.prediction, self.marked.hold(path).verdict)
+        path = self.site.hold(Candidate(self.poses, *judged))
+        return JudgedCase(self, path.prediction, path.verdict)
 
     def predict(self) -> PathPrediction:
         """Predict all of the path, also beyond its first failure."""
@@ -118,12 +127,19 @@ class Case:
         return (0 if rows.start == 0 else 1) <= row <= place - rows.start
 
 
-def case_of(judge: PathJudge, poses: Floats) -> Case:
+def case_of(site: Site, poses: Floats) -> Case:
     """Return the case of a path that was judged."""
-    options = judge.options
-    chance = min(options.accepted_chance, ACCEPTED_CHANCE)
-    about = options.model, options.map_sigmas, chance, judge.unobserved_check, judge.marked
-    return Case(judge.rover, judge.terrain, poses, *about)
+    options = site.options
+    return Case(
+        site.rover,
+        site.terrain,
+        poses,
+        options.model,
+        options.map_sigmas,
+        min(options.accepted_chance, ACCEPTED_CHANCE),
+        site.unobserved_check,
+        site.marked,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,14 +249,7 @@ class JudgedCase:
     def path_around(self) -> Floats | None:
         """Another path (n, 3) from start to goal that passes; None if none is found in time."""
         case = self.case
-        options = PathQueryOptions(
-            waypoint_spacing=case.spacing,
-            model=case.options,
-            map_sigmas=case.sigmas,
-            accepted_chance=case.accepted_chance,
-        )
-        ends, held = (case.poses[0], case.poses[-1]), (case.unobserved_check, case.marked)
-        query = SearchQuery(case.rover, case.terrain, *ends, options, *held)
+        query = SearchQuery(case.site, case.poses[0], case.poses[-1])
         try:
             found = find_path(query, SEARCH)
         except QuestionStoppedError:

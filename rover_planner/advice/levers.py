@@ -100,8 +100,8 @@ class Lever:
     """True if it changes the path. Only one such lever is set at a time."""
     needs_others: bool = False
     """True if somebody outside the rover has to do, to know or to decide something."""
-    is_option: bool = True
-    """True if path and options of `predict` hold all that it changes."""
+    option: str = ""
+    """The option of `predict` that it sets; empty if it sets none."""
 
 
 def _policies(refusal: JudgedCase) -> Choice:
@@ -136,7 +136,8 @@ def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
         verb = lowered if turn > 0.0 else raised
         return f"{verb.format(f'{abs(turn):.2f} rad')}{_tip_move(refusal, k, angle)}"
 
-    return Lever(("arm_yaw", "arm_shoulder", "arm_elbow")[k], "rad", settings, apply, words)
+    name = ("arm_yaw", "arm_shoulder", "arm_elbow")[k]
+    return Lever(name, "rad", settings, apply, words, option="joint_angles")
 
 
 def _tip_move(refusal: JudgedCase, k: int, angle: float) -> str:
@@ -303,21 +304,21 @@ def _limit(row: Limit) -> Lever:
 
     return Lever(
         f"limits.{row.reads}", "rad" if row.reads == "tilt" else row.unit.name, settings, apply,
-        words, needs_others=True, is_option=False,
+        words, needs_others=True,
     )  # fmt: skip
 
 
 LEVERS: tuple[Lever, ...] = (
     Lever(
         "policy", "", _policies, lambda case, _refusal, policy: case.change(policy=policy),
-        lambda _refusal, policy, _now: TORQUES[policy],
+        lambda _refusal, policy, _now: TORQUES[policy], option="policy",
     ),
     _arm_joint(1, "Lift the arm by {}", "Lower the arm by {}"),
     _arm_joint(0, "Swing the arm by {} to the right", "Swing the arm by {} to the left"),
     _arm_joint(2, "Raise the forearm by {}", "Lower the forearm by {}"),
     Lever(
         "payload", "kg", _payload, lambda case, _refusal, mass: case.change(payload=mass),
-        _describe_payload,
+        _describe_payload, option="payload",
     ),
     Lever(
         "shift", "m", _aside,
@@ -359,21 +360,20 @@ LEVERS: tuple[Lever, ...] = (
     Lever(
         "backward", "", _backward, _reverse,
         lambda _refusal, _value, _now: "Turn round and drive it backwards", keeps_rows=False,
+        option="backward",
     ),
     Lever(
         "friction", "", _friction, lambda case, _refusal, mu: case.change(friction=mu),
         lambda _refusal, mu, now: f"A friction of {mu:.2f} would do; {mu - now:.2f} is missing",
-        needs_others=True,
+        needs_others=True, option="friction",
     ),
     Lever(
         "max_torque", "N m", _torque, lambda case, _refusal, most: case.change(max_torque=most),
         lambda _refusal, most, now: f"Motors of {most:.2f} N m would do; "
             f"{most - now:.2f} N m are missing",
-        needs_others=True,
+        needs_others=True, option="max_torque",
     ),
-    Lever(
-        "ground", "m", _rock, _lower_rock, _describe_rock, needs_others=True, is_option=False,
-    ),
+    Lever("ground", "m", _rock, _lower_rock, _describe_rock, needs_others=True),
     *(
         _limit(row)
         for row in LIMITS

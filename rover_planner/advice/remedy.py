@@ -11,8 +11,6 @@ from rover_planner.advice.levers import Lever
 
 TELLING_LOAD = 0.01
 """Least change of an axle's load that is told [share of the weight]."""
-OPTIONS = ("policy", "friction", "max_torque", "joint_angles", "payload", "backward")
-"""Options of `predict` that levers set."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Remedy:
     @property
     def is_option(self) -> bool:
         """True if `predict` can be told all of it."""
-        return all(one.lever.is_option for one in self.levers)
+        return all(one.lever.option or one.lever.changes_path for one in self.levers)
 
     @property
     def extra_time(self) -> float:
@@ -72,13 +70,9 @@ class Remedy:
         )
 
     def options(self) -> dict[str, Any]:
-        """Return the options of `predict` that change."""
-        old, new = self.refusal.case.options, self.judged.case.options
-        found = {
-            name: getattr(new, name)
-            for name in OPTIONS
-            if getattr(old, name) != getattr(new, name)
-        }
+        """Return the options of `predict` that the levers set."""
+        new = self.judged.case.options
+        found = {name: getattr(new, name) for one in self.levers if (name := one.lever.option)}
         if "joint_angles" in found:
             found["joint_angles"] = new.arm_angles
         return found

@@ -62,23 +62,20 @@ def plan(
     from rover_planner.planning.path_query import PathQueryOptions
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
     from rover_planner.planning.search.query_file import write_query
+    from rover_planner.planning.search.site import Site
 
     settings = LatticeSettings(
         budget=budget, cell=cell, frontier=frontier, chance_weight=chance_weight
     )
-    question = SearchQuery(
-        load_rover(rover),
-        load_terrain(terrain, max_cells),
-        start,
-        goal,
-        PathQueryOptions(
-            model=SweepOptions(
-                policy=policy, friction=friction, max_torque=max_torque, soil=soil, payload=payload
-            ),
-            map_sigmas=sigmas,
-            accepted_chance=accepted_chance,
+    options = PathQueryOptions(
+        model=SweepOptions(
+            policy=policy, friction=friction, max_torque=max_torque, soil=soil, payload=payload
         ),
+        map_sigmas=sigmas,
+        accepted_chance=accepted_chance,
     )
+    site = Site(load_rover(rover), load_terrain(terrain, max_cells), options)
+    question = SearchQuery(site, start, goal)
     if dump is not None:
         write_query(dump, question, settings)
     _ask(question, settings, out, picture, Path(terrain).name)
@@ -114,11 +111,11 @@ def _ask(
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")
         search_paths()  # so that the budget is not spent on it
-        progress(f"search a path for {question.rover.name}")
+        progress(f"search a path for {question.site.rover.name}")
         answer = find_path(question, settings)
     if answer.path is not None:
-        options = question.options.model
-        assumed = assume(question.rover, options, question.options.map_sigmas)
+        site = question.site
+        assumed = assume(site.rover, site.options.model, site.options.map_sigmas)
         write_prediction(out, answer.path.prediction, answer.path.verdict, assumptions=assumed)
     if picture is not None:
         from rover_planner.figures.path_picture import draw_path

@@ -315,12 +315,13 @@ def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -
     from rover_planner.planning.path_query import PathQueryOptions, add_path, answer_path_query
     from rover_planner.planning.search.path_search import find_path
     from rover_planner.planning.search.query import SearchQuery
+    from rover_planner.planning.search.site import Site
 
     options = PathQueryOptions()
     answer = answer_path_query(rover, ground, start, goal, options)
     if answer.traversable or not ground.contains(*goal[:2]):
         return answer
-    found = find_path(SearchQuery(rover, ground, start, goal, options))
+    found = find_path(SearchQuery(Site(rover, ground, options), start, goal))
     return answer if found.path is None else add_path(answer, found.path, np.array(goal))
 
 
@@ -330,7 +331,7 @@ def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) 
     Args:
         rover: The rover.
         mission: The goals.
-        answers: The verdict on each goal, as `MissionPlanner.ask` returns it.
+        answers: The verdict on each goal, as mission_planner --json prints it.
     """
     table = Table(
         title=f"Answers of /traverse_server for {rover.name}",

@@ -41,13 +41,13 @@ def draw_path(path: Path, question: SearchQuery, answer: SearchResult, map_name:
     Raises:
         PlanningError: The file cannot be written.
     """
-    terrain = question.terrain
+    terrain = question.site.terrain
     with drawing(path, (8.5, 7.0 if answer.path is None else 9.5)) as figure:
         if answer.path is None:
             axes = figure.subplots()
         else:
             axes, below = figure.subplots(2, height_ratios=(2.4, 1.0))
-            _draw_uses(below, question.rover, answer.path)
+            _draw_uses(below, question.site.rover, answer.path)
         draw_terrain(axes, terrain)
         if answer.closed is not None:
             _draw_area(axes, answer)
@@ -56,7 +56,7 @@ def draw_path(path: Path, question: SearchQuery, answer: SearchResult, map_name:
             axes.plot(x, y, color=PASSABLE, linewidth=2.2, label="path", **outlined(4.5))
         _draw_end(axes, "start", np.asarray(question.start), INK)
         _draw_end(axes, "goal", np.asarray(question.goal), REFUSED)
-        title = f"{question.rover.name} on {map_name}: {_title(answer)}"
+        title = f"{question.site.rover.name} on {map_name}: {_title(answer)}"
         axes.set_title(title, loc="left", wrap=True)
         axes.legend(loc="upper left", frameon=True, framealpha=0.85)
 

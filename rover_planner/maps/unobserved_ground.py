@@ -12,10 +12,12 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.angles import wrap
 from rover_planner.maps.cells import CellBox, grid_of
 from rover_planner.maps.layers import FOOTPRINT, CellSources
-from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
 
 UNOBSERVED_CODE = "blind_ground"
 """Code of the refusal."""
+ALLOW, ALLOW_FOOTPRINT, REFUSE = "allow", "allow_footprint", "refuse"
+"""Rules, values of the parameter blind_ground: paths whose belly passes over ground that was never
+seen are allowed, allowed over the start footprint only, or refused."""
 SEEN, ASSUMED, UNSEEN = range(3)
 """Kinds of cells: measured, filled in as part of the start footprint, or nothing."""
 MOST = 300

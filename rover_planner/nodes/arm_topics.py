@@ -10,15 +10,10 @@ from msg_adapters.errors import MessageError
 from msg_adapters.results.diagnostics import to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.traversability.reach import ReachAnswer
-from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.questions import (
-    Question,
-    ReachQuery,
-    ReachRefusal,
-)
-from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.deferred import Reply, serve_later
+from rover_planner.planning.answering.judgement import PathJudgement
+from rover_planner.planning.answering.questions import ReachQuery
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.subscriptions import subscribe_to_requests
 
@@ -27,7 +22,7 @@ class ArmTopics:
     """Connects a ReachQuery to the topics and the service of a node."""
 
     def __init__(self, node: RoverNode[TraverseServerParameters], desk: QuestionDesk):
-        self._node, self._desk, self._map_frame = node, desk, node.values.map_frame
+        self._node, self._map_frame = node, node.values.map_frame
         self.query = ReachQuery()
         """The query, with the last target and wrench."""
         for kind, name, take in (
@@ -35,7 +30,7 @@ class ArmTopics:
             (WrenchStamped, "~/tool_wrench", self._take_wrench),
         ):
             subscribe_to_requests(node, kind, name, take, node.values.input_reliability)
-        serve_later(node, Trigger, "~/check_reach", self._check_reach)
+        desk.serve(Trigger, "check_reach", lambda _: self.query, self._fill)
 
     def _take_target(self, message: PoseStamped) -> None:
         try:
@@ -55,20 +50,21 @@ class ArmTopics:
             self._node.get_logger().error(f"~/tool_wrench refused: {error}")
         self.query = replace(self.query, force=force, moment=moment, wrench_refusal=refusal)
 
-    def _check_reach(
-        self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
+    def _fill(
+        self,
+        _request: object,
+        response: Trigger.Response,
+        answer: Answer[ReachAnswer | PathJudgement],
     ) -> None:
-        def send(answer: ReachAnswer, _identity: IdentityReport) -> None:
-            response.success = answer.possible
-            response.message = to_json(answer.to_dict())
-            reply(response)
-            self._log(answer)
-
-        self._desk.ask(Question("check_reach", "", self.query.ask, ReachRefusal), send)
-
-    def _log(self, answer: ReachAnswer) -> None:
+        judged = answer.judgement
+        if isinstance(judged, PathJudgement):
+            told = {"code": judged.code, "reason": judged.reason}
+            report = {"possible": False, "reachable": False, **told}
+        else:
+            report = judged.to_dict()
+        response.success, response.message = report["possible"], to_json(report)
         logger = self._node.get_logger()
-        if answer.possible:
+        if response.success:
             logger.info("check_reach: possible")
         else:
-            logger.warning(f"check_reach: refused ({answer.code}): {answer.reason}")
+            logger.warning(f"check_reach: refused ({judged.code}): {judged.reason}")

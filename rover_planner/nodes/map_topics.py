@@ -29,7 +29,7 @@ from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.lazy_publisher import LazyPublisher
-from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
+from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake, are_gridded_alike
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import ServerInputs
@@ -68,7 +68,7 @@ class MapTopics(MapIntake):
         self._is_from_topic = False
         self._logged_at, self._logged_kind = -float("inf"), ("", False)
         self._map_count = 0
-        super().__init__(node.get_logger(), node.values, inputs.frames)
+        super().__init__(node.get_logger(), inputs.frames)
         self._subscribe(CLOUD, PointCloud2)
         serve_later(node, LoadMap, "~/load_map", self._load_map)
         grid_map = find_type("grid_map_msgs.msg:GridMap")
@@ -93,14 +93,14 @@ class MapTopics(MapIntake):
             futures.wait([job], min(WAIT, left))
             check()
 
-    def apply(self, values: TraverseServerParameters) -> None:
+    def apply(self, before: TraverseServerParameters) -> None:
         """Make the present map anew if a parameter of messages has changed.
 
         Those of merging and filling count from the next map on.
         """
-        rover = self._service.settings.rover
-        self.do(lambda: self._inputs.keeper.apply(rover, values))
-        if self.take_parameters(values) and self._is_from_topic:
+        settings = self._service.settings
+        self.do(partial(self._inputs.keeper.apply, settings.rover, settings.parameters))
+        if self._is_from_topic and not are_gridded_alike(before, settings.parameters):
             self.repeat()
         else:
             self.do(self.expect_other)
@@ -129,7 +129,7 @@ class MapTopics(MapIntake):
 
     def _load(self, url: str) -> OccupancyGrid:
         """Take the map of a file; return its known cells."""
-        values = self.values
+        values = self._service.settings.parameters
         limits = values.map_folder, values.max_map_bytes, values.max_map_cells
         terrain = open_map(url, *limits)
         standing, now = self._service.standing(), self._node.seconds

@@ -4,34 +4,25 @@
 Both exist where nav2_msgs is installed.
 """
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan
 from numpy.typing import NDArray
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from rover_physics.errors import RoverError
-from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.nodes.result_topics import ResultMessages
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.questions import (
-    Question,
-    ask_about_path,
-    ask_in_vain,
-)
+from rover_planner.planning.answering.questions import Question
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.server_inputs import describe_path
 
 NO_PATH = "NO_VALID_PATH"
 ERRORS = {
@@ -53,7 +44,7 @@ class Nav2Services:
         node: Node,
         desk: QuestionDesk,
         read_path: Callable[[Path], GivenPath],
-        read_question: Callable[[str, PoseStamped, PoseStamped], Question],
+        read_question: Callable[[GetPlan.Request], Question],
         publish: Callable[[PathJudgement, IdentityReport], ResultMessages],
     ):
         """Create service and action, where their types are installed.
@@ -61,17 +52,15 @@ class Nav2Services:
         Args:
             node: The node.
             desk: Answers the questions.
-            read_path: Returns a path of the robot as one of the body; refuses one that is too
-                long.
-            read_question: Returns the question of a service, by start and goal of the robot.
+            read_path: Returns a path of the robot as one of the body, or why it is refused.
+            read_question: Returns the question for a path of the robot.
             publish: Publishes the results of a judgement and returns them.
         """
-        self._desk, self._publish = desk, publish
-        self._read_path, self._read_question = read_path, read_question
-        self._answers: dict[int, tuple[bool, Any]] = {}
+        self._desk, self._read_question, self._publish = desk, read_question, publish
+        self._answers: dict[int, Answer[PathJudgement]] = {}
         is_valid = find_type("nav2_msgs.srv:IsPathValid")
         if is_valid is not None:
-            serve_later(node, is_valid, "~/is_path_valid", self.check)
+            desk.serve(is_valid, "is_path_valid", lambda asked: read_path(asked.path), self.fill)
         action: Any = find_type("nav2_msgs.action:ComputePathToPose")
         self.make_result: Callable[[], Any] | None = None
         """Makes an empty result of the action."""
@@ -88,57 +77,49 @@ class Nav2Services:
                 handle_accepted_callback=self.compute,
             )
 
-    def check(self, request: Any, response: Any, reply: Reply) -> None:
-        """Take a request; the reply has `is_valid` and `invalid_pose_indices`.
+    def fill(self, request: Any, response: Any, answer: Answer[PathJudgement]) -> None:
+        """Fill a response of IsPathValid: `is_valid` and `invalid_pose_indices`.
 
         The indices are those of the given poses at or after waypoints that are not passable. A
         path that is refused before it is judged, such as without a map, has all of them.
         """
-        path: Path = request.path
-        about, stamp = describe_path(path)
-        try:
-            given = self._read_path(path)
-            question = ask_about_path("is_path_valid", about, given)
-        except RoverError as error:
-            question = ask_in_vain("is_path_valid", about, str(error))
-
-        def send(judged: PathJudgement, identity: IdentityReport) -> None:
-            response.is_valid = judged.traversable
-            response.invalid_pose_indices = list(range(len(path.poses)))
-            if judged.candidate is not None:
-                assert judged.judge is not None and given.poses is not None
-                spacing = judged.judge.options.waypoint_spacing
-                response.invalid_pose_indices = find_invalid_poses(
-                    judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
-                )
-            self._publish(judged, replace(identity, path_hash=about, path_stamp=stamp))
-            reply(response)
-
-        self._desk.ask(question, send)
+        judged, given = answer.judgement, answer.question
+        response.is_valid = judged.traversable
+        response.invalid_pose_indices = list(range(len(request.path.poses)))
+        if judged.candidate is not None:
+            assert judged.judge is not None
+            assert isinstance(given, GivenPath) and given.poses is not None
+            spacing = judged.judge.site.options.waypoint_spacing
+            response.invalid_pose_indices = find_invalid_poses(
+                judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
+            )
+        self._publish(judged, answer.identity)
 
     def compute(self, handle: Any) -> None:
         """Take an accepted goal; it is executed, which ends it, once its answer is found."""
-        goal, begin, make_result = handle.request, time.monotonic(), self.make_result
-        assert make_result is not None
-        start = goal.start if goal.use_start else PoseStamped()
+        goal = handle.request
+        request = GetPlan.Request(goal=goal.goal)
+        if goal.use_start:
+            request.start = goal.start
 
-        def send(judged: PathJudgement, identity: IdentityReport) -> None:
-            result = make_result()
-            result.path = self._publish(judged, identity).plan
-            seconds = time.monotonic() - begin
-            result.planning_time = Duration(seconds=seconds).to_msg()
-            result.error_code = getattr(result, _name_error(judged))
-            if hasattr(result, "error_msg"):  # newer than Jazzy's first release
-                result.error_msg = "" if judged.traversable else judged.reason
-            self._answers[id(handle)] = judged.traversable, result
+        def execute(answer: Answer[PathJudgement]) -> None:
+            self._answers[id(handle)] = answer
             handle.execute()
 
-        self._desk.ask(self._read_question("compute_path_to_pose", start, goal.goal), send)
+        self._desk.ask("compute_path_to_pose", self._read_question(request), execute)
 
     def finish(self, handle: Any) -> Any:
         """End a goal whose answer is found; return its result."""
-        is_found, result = self._answers.pop(id(handle))
-        if is_found:
+        answer = self._answers.pop(id(handle))
+        judged = answer.judgement
+        assert self.make_result is not None
+        result = self.make_result()
+        result.path = self._publish(judged, answer.identity).plan
+        result.planning_time = Duration(seconds=answer.latency).to_msg()
+        result.error_code = getattr(result, _name_error(judged))
+        if hasattr(result, "error_msg"):  # newer than Jazzy's first release
+            result.error_msg = "" if judged.traversable else judged.reason
+        if judged.traversable:
             handle.succeed()
         else:
             handle.abort()
@@ -154,7 +135,7 @@ def _name_error(judged: PathJudgement) -> str:
         return name
     if chosen.verdict.first_failure == 0:
         return "START_OUTSIDE_MAP"
-    return NO_PATH if judged.judge.terrain.contains(*chosen.poses[-1, :2]) else name
+    return NO_PATH if judged.judge.site.terrain.contains(*chosen.poses[-1, :2]) else name
 
 
 def find_invalid_poses(codes: Sequence[str], given: NDArray[np.intp]) -> list[int]:

@@ -60,7 +60,7 @@ class ResultTopics:
             identity: What it is about; without a path, that of the plan is added.
         """
         values, judge = self._node.values, judgement.judge
-        rover = self._inputs.service.settings.rover if judge is None else judge.rover
+        rover = self._inputs.service.settings.rover if judge is None else judge.site.rover
         header = Header(frame_id=values.map_frame, stamp=ns_to_stamp(self._next_stamp()))
         results = ResultMessages(judgement, identity, header, rover, values, self._inputs)
         if judgement.traversable and not identity.path_hash:

@@ -76,7 +76,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._clock_watch = ClockWatch(values.clock_timeout)
         self.frames = NodeFrames(self, values)
         """Knows where the frames of messages are on the map."""
-        self._maps = TractionMaps(self, lambda: self.service.settings.rover, self.frames)
+        self._maps = TractionMaps(self, self.service, self.frames)
         self._inputs = TractionInputs(self, self.service, self._maps, self.frames)
         names = self._inputs.joint_names
         order = joint_order(values.joints, names)
@@ -130,11 +130,11 @@ class TractionController(RoverNode[TractionControllerParameters]):
             self.heard.subscribe(Bool, "~/emergency_stop", self._take_emergency_stop, qos)
 
     def _apply_settings(self, settings: TractionSettings) -> None:
-        values = self.values
+        before, values = self.service.settings, self.values
         self._supervisor.configure(settings)
         self._clock_watch.timeout = values.clock_timeout
         self.frames.apply_timeout(values.transform_timeout)
-        self._maps.apply(values)
+        self._maps.apply(before.parameters)
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         before = self._supervisor.enabled

@@ -4,11 +4,9 @@
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -31,19 +29,14 @@ from rover_planner.nodes.map_topics import MapCloud, MapTopics
 from rover_planner.nodes.nav2_services import Nav2Services
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, PathWatch
-from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.nodes.result_topics import ResultMessages, ResultTopics
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.questions import (
-    Question,
-    ask_about_path,
-    ask_for_path,
-    ask_in_vain,
-)
+from rover_planner.planning.answering.questions import PathQuestion, UnreadableRequest
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import (
     ServiceSettings,
@@ -54,7 +47,6 @@ from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer
@@ -103,8 +95,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.desk = QuestionDesk(self, self.service, self._maps)
         """Takes the questions of all services."""
         self._create_subscriptions()
-        serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
-        serve_later(self, Trigger, "~/check_path", self._check_path)
+        self.desk.serve(GetPlan, "can_traverse", self.read_question, self._fill_plan)
+        self.desk.serve(Trigger, "check_path", lambda _: self.service.given_path, self._fill_check)
         Nav2Services(self, self.desk, self.read_path, self.read_question, self.publish)
         self._advice = AdviceTopics(self, self.desk)
         self.create_service(Trigger, "~/cancel", self._cancel)
@@ -159,8 +151,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.get_logger().info(f"ready for rover {name}, {there}")
 
     def _apply_settings(self, settings: ServiceSettings) -> None:
-        self._inputs.values, self.service.settings = self.values, settings
-        self._maps.apply(self.values)
+        before, self.service.settings = self.service.settings, settings
+        self._maps.apply(before.parameters)
         self.watch.apply()
         self.frames.apply_timeout(self.values.transform_timeout)
         self._hazards.apply()
@@ -227,7 +219,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             about = describe_path(path)
             self.service.given_path = self._inputs.read_path(path)
         except RoverError as error:
-            self.service.refuse_path(str(error), *about)
+            # Later questions must not be about an outdated one.
+            refused = f"the last path was refused: {error}"
+            self.service.given_path = GivenPath(None, refused, *about)
             self.get_logger().error(f"~/path refused: {error}")
 
     def _check_length(self, poses: int) -> None:
@@ -240,49 +234,30 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             )
 
     def read_path(self, path: Path) -> GivenPath:
-        """Return a path of the robot as one of the body in the map frame.
-
-        Raises:
-            RoverError: It is too long, a value is wrong, or a frame is not known.
-        """
-        self._check_length(len(path.poses))
-        return self._inputs.read_path(path)
-
-    def _can_traverse(
-        self, request: GetPlan.Request, response: GetPlan.Response, reply: Reply
-    ) -> None:
-        question = self.read_question(
-            "can_traverse", request.start, request.goal, request.tolerance
-        )
-
-        def send(judged: PathJudgement, identity: IdentityReport) -> None:
-            response.plan = self.publish(judged, identity).plan
-            reply(response)
-
-        self.desk.ask(question, send)
-
-    def read_question(
-        self, service: str, begin: PoseStamped, end: PoseStamped, tolerance: float = 0.0
-    ) -> Question:
-        """Return the question for a path between poses of the robot; transforms are those of now.
-
-        Args:
-            service: Name of the service.
-            begin: Start; an empty one is where the rover is.
-            end: Goal.
-            tolerance: As in `Snapshot.answer` [m].
-        """
-        about = plan_request_hash(begin, end, tolerance)
+        """Return a path of the robot as one of the body in the map frame, or why it is refused."""
         try:
-            return ask_for_path(service, about, *self._read_ends(begin, end), tolerance)
+            self._check_length(len(path.poses))
+            return self._inputs.read_path(path)
         except RoverError as error:
-            return ask_in_vain(service, about, str(error))
+            return GivenPath(None, str(error), *describe_path(path), code="bad_request")
 
-    def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
-        """Return start and goal (3,) of the body in the map frame; an empty start is here."""
-        read = self.frames.read_pose
-        start = self._find_here() if is_empty(begin) else read(begin, "start")
-        return start, read(end, "goal")
+    def read_question(self, request: GetPlan.Request) -> PathQuestion | UnreadableRequest:
+        """Return the question for a path between poses of the robot, by the transforms of now.
+
+        An empty start is where the rover is.
+        """
+        begin, end, tolerance = request.start, request.goal, request.tolerance
+        about, read = plan_request_hash(begin, end, tolerance), self.frames.read_pose
+        try:
+            start = self._find_here() if is_empty(begin) else read(begin, "start")
+            return PathQuestion(start, read(end, "goal"), tolerance, about)
+        except RoverError as error:
+            return UnreadableRequest(str(error), about)
+
+    def _fill_plan(
+        self, _request: object, response: GetPlan.Response, answer: Answer[PathJudgement]
+    ) -> None:
+        response.plan = self.publish(answer.judgement, answer.identity).plan
 
     def _find_watched(self) -> Pose | None:
         """Return the pose (3,) of the body by /tf, else by odometry of just now."""
@@ -302,18 +277,12 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             )
         return here
 
-    def _check_path(
-        self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
+    def _fill_check(
+        self, _request: object, response: Trigger.Response, answer: Answer[PathJudgement]
     ) -> None:
-        path = self.service.given_path
-
-        def send(judged: PathJudgement, identity: IdentityReport) -> None:
-            about = replace(identity, path_hash=path.hash, path_stamp=path.stamp)
-            response.success = judged.traversable
-            response.message = to_json(self.publish(judged, about).report.to_dict())
-            reply(response)
-
-        self.desk.ask(ask_about_path("check_path", path.hash, path), send)
+        report = self.publish(answer.judgement, answer.identity).report
+        response.success = answer.judgement.traversable
+        response.message = to_json(report.to_dict())
 
     def publish(self, judgement: PathJudgement, identity: IdentityReport) -> ResultMessages:
         """Return the results of a judgement, which are published after the answer."""
@@ -326,7 +295,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _publish_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
         """Publish why the rover is to stop, as the results of a judged path."""
-        self.publish(judgement, self.desk.identify("monitor", watched, snapshot))
+        about = GivenPath(hash=watched)
+        self.publish(judgement, self.desk.register.identify("monitor", about, snapshot))
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         why = CANCELLED, "the question was cancelled by ~/cancel"

@@ -21,6 +21,7 @@ from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.primitives import make_primitives
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.supervisor import TractionSupervisor
@@ -38,8 +39,8 @@ def search_paths() -> None:
         elevation = np.zeros((60, 60))
         elevation[:rows, 30] = 1.0
         ground = Terrain(elevation, 0.05, (0.0, 0.0))
-        question = SearchQuery(load_rover("lsr1"), ground, *ends, PathQueryOptions())
-        find_path(question, LatticeSettings(budget=60.0, cell=0.4))
+        site = Site(load_rover("lsr1"), ground, PathQueryOptions())
+        find_path(SearchQuery(site, *ends), LatticeSettings(budget=60.0, cell=0.4))
 
 
 def search_lattice() -> None:

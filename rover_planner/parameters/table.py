@@ -34,6 +34,8 @@ class ParameterSpec:
     """Allowed texts; empty allows any."""
     read_only: bool
     """True if the value is fixed after the start of the node."""
+    least: float
+    """Smallest allowed number other than 0."""
 
     @property
     def type_name(self) -> str:
@@ -75,6 +77,8 @@ class ParameterSpec:
         low, high = self.bounds or (-math.inf, math.inf)
         if self.bounds and not low <= value <= high:
             return f"be in {low:g} to {high:g} {self.unit}".rstrip()
+        if self.least and 0.0 < value < self.least:
+            return f"be 0, or at least {self.least:g} {self.unit}"
         if self.choices and value not in self.choices:
             return f"be one of {', '.join(self.choices)}"
         return ""
@@ -101,9 +105,10 @@ def parameter(
     *,
     choices: tuple[str, ...] = (),
     read_only: bool = False,
+    least: float = 0.0,
 ) -> Value:
     """Make a field of a `ParameterTable`; `ParameterSpec` explains the arguments."""
-    spec = ParameterSpec("", default, meaning, unit, bounds, choices, read_only)
+    spec = ParameterSpec("", default, meaning, unit, bounds, choices, read_only, least)
     made: Any = field(default=default, metadata={"spec": spec})
     return made  # a dataclass field at run time; type checkers see the type of its value
 

@@ -6,21 +6,12 @@ from dataclasses import dataclass
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_planner.maps.unobserved_ground import ALLOW, ALLOW_FOOTPRINT, REFUSE
 from rover_planner.parameters import shared
-from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
+from rover_planner.parameters.table import ParameterTable, parameter
 
-LEAST_DISTANCES = {
-    "candidate_spacing": 0.01,
-    "waypoint_spacing": 0.001,
-    "plan_spacing": 0.001,
-    "monitor_offset": 0.01,
-}
-"""Smallest values other than 0 of the distances along, between and from paths [m]."""
-REFUSE, INTERPOLATE = "refuse", "interpolate"
-"""Values of the parameter unknown_cells."""
-ALLOW, ALLOW_FOOTPRINT = "allow", "allow_footprint"
-"""Values of the parameter blind_ground beside REFUSE: paths whose belly passes over ground that
-was never seen are allowed, or allowed over the start footprint only."""
+INTERPOLATE = "interpolate"
+"""Value of the parameter unknown_cells beside REFUSE."""
 NEWEST, SUREST = "newest", "surest"
 """Values of the parameter map_merge: which of two heights of a cell counts, the newer one or the
 one with the smaller deviation."""
@@ -69,13 +60,18 @@ class TraverseServerParameters(ParameterTable):
     )
     candidate_count: int = parameter(9, "Largest number of candidate paths.", bounds=(1, 99))
     candidate_spacing: float = parameter(
-        0.0, "Distance between candidates half-way; 0 is three wheel radii.", "m", (0.0, 10.0)
+        0.0,
+        "Distance between candidates half-way; 0 is three wheel radii.",
+        "m",
+        (0.0, 10.0),
+        least=0.01,
     )
     waypoint_spacing: float = parameter(
         0.0,
         "Largest distance between judged waypoints; 0 is a fifth of the wheel radius.",
         "m",
         (0.0, 1.0),
+        least=0.001,
     )
     planner: str = parameter(
         AUTO,
@@ -105,6 +101,7 @@ class TraverseServerParameters(ParameterTable):
         "waypoint.",
         "m",
         (0.0, 100.0),
+        least=0.001,
     )
     steering_limit: float = shared.STEERING_LIMIT
     steering_sign: str = shared.STEERING_SIGN
@@ -244,6 +241,7 @@ class TraverseServerParameters(ParameterTable):
         "Distance from its path above which the rover is to stop; 0 is five wheel radii.",
         "m",
         (0.0, 100.0),
+        least=0.01,
     )
     monitor_timeout: float = parameter(
         1.0,
@@ -268,17 +266,3 @@ class TraverseServerParameters(ParameterTable):
     hazard_headings: int = parameter(
         8, "Headings of the hazard map.", bounds=(1, 36), read_only=True
     )
-
-    def __post_init__(self) -> None:
-        """Check all values.
-
-        Raises:
-            ParameterError: As for all tables, or one of LEAST_DISTANCES is not kept.
-        """
-        super().__post_init__()
-        for name, least in LEAST_DISTANCES.items():
-            distance = getattr(self, name)
-            if 0.0 < distance < least:
-                raise ParameterError(
-                    f"parameter {name} is {distance}; it must be 0, or at least {least:g} m"
-                )

@@ -55,16 +55,22 @@ class MarkedPlaces:
         """Return (k,) whether pieces of path, each of poses (n, 3), are refused."""
         if not self.places:
             return np.zeros(len(pieces), bool)
-        return np.array([self._find(poses) is not None for poses in pieces], bool)
+        return np.array([self.find(poses) is not None for poses in pieces], bool)
+
+    def refuses_ends(
+        self, start: NDArray[np.float64], ends: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Return (n,) whether no path from a start (3,) may lead to ends (n, 3)."""
+        return self.refuses([np.stack([start, end]) for end in ends])
 
     def hold(self, candidate: Candidate) -> Candidate:
         """Return a path, refused where it enters a place."""
-        found = self._find(candidate.poses) if candidate.verdict.traversable else None
+        found = self.find(candidate.poses) if candidate.verdict.traversable else None
         if found is None:
             return candidate
         return candidate.refuse_at(found[0], MARKED_CODE, found[1].describe())
 
-    def _find(self, poses: NDArray[np.float64]) -> tuple[int, MarkedPlace] | None:
+    def find(self, poses: NDArray[np.float64]) -> tuple[int, MarkedPlace] | None:
         """Return the first pose that comes nearer to a centre within a disc, and its place."""
         firsts = []
         for place in self.places:

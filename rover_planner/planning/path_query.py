@@ -134,7 +134,7 @@ class PathAnswer:
 
     candidates: tuple[Candidate, ...]
     """The candidates in the order of their generation, the direct connection first."""
-    nearest: int
+    choice: int
     """Index of the explained candidate: the best, which is the traversable one with the lowest
     cost, or the one that gets furthest."""
     goal: Pose | None = None
@@ -146,13 +146,13 @@ class PathAnswer:
 
     @property
     def chosen(self) -> Candidate:
-        """The explained candidate, of index `nearest`."""
-        return self.candidates[self.nearest]
+        """The explained candidate, of index `choice`."""
+        return self.candidates[self.choice]
 
     @property
     def number(self) -> int:
         """Number of the chosen candidate in texts and messages, counted from 1."""
-        return self.nearest + 1
+        return self.choice + 1
 
     @property
     def traversable(self) -> bool:
@@ -225,14 +225,14 @@ def choose_by_chance(
     Chances are found in the order of the costs, up to the first that is accepted.
     """
     while (answer := choose(tuple(candidates))).traversable:
-        best = answer.nearest
+        best = answer.choice
         if options.accepted_chance >= 1.0 or candidates[best].verdict.failure_chance_at:
             return answer
         candidates[best] = check_path(
             rover, terrain, candidates[best].poses, options, stop_at_failure=True
         )
     if answer.chosen.verdict.code == CHANCE:
-        candidates[answer.nearest] = check_path(rover, terrain, answer.chosen.poses, options)
+        candidates[answer.choice] = check_path(rover, terrain, answer.chosen.poses, options)
     return choose(tuple(candidates))
 
 

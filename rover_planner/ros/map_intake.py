@@ -25,9 +25,6 @@ from rover_planner.ros.logs import RepeatLog
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 """Topics of maps: PointCloud2, and GridMap where its package is installed."""
 
-CELL_PARAMETERS = ("map_resolution", "cell_height")
-"""Parameters by which clouds are gridded."""
-
 
 class MapIntake(ABC):
     """Takes serialised messages, and has a map made of the latest of each type.
@@ -35,16 +32,13 @@ class MapIntake(ABC):
     `prepare`, `renew` and `refuse` are called in the thread.
     """
 
-    def __init__(self, logger: RcutilsLogger, values: Any, frames: Frames):
+    def __init__(self, logger: RcutilsLogger, frames: Frames):
         """Begin without a map.
 
         Args:
             logger: Logs refusals, those of one kind once in a while.
-            values: A table with the CELL_PARAMETERS.
             frames: Knows where frames are on the map; asked in the thread.
         """
-        self.values = values
-        """The parameters in force."""
         self.topic = CLOUD
         """Topic of the map in work."""
         self._logger, self._frames, self._refusals = logger, frames, RepeatLog()
@@ -81,11 +75,6 @@ class MapIntake(ABC):
         line = self._refusals.line(text, time.monotonic())
         if line:
             self._logger.error(line)
-
-    def take_parameters(self, values: Any) -> bool:
-        """Take new parameters; return whether clouds are gridded otherwise from now on."""
-        before, self.values = self.values, values
-        return any(getattr(before, name) != getattr(values, name) for name in CELL_PARAMETERS)
 
     def offer(self, message: bytes, kind: type = PointCloud2) -> None:
         """Take a serialised message; one of its type that still waits is replaced."""
@@ -164,6 +153,11 @@ class MapIntake(ABC):
         except TransformError:
             self._unplaced = header.frame_id, stamp
             raise
+
+
+def are_gridded_alike(before: Any, now: Any) -> bool:
+    """Return whether two tables of parameters agree in those by which clouds are gridded."""
+    return before.map_resolution == now.map_resolution and before.cell_height == now.cell_height
 
 
 def read_message(message: bytes, kind: type) -> Any:

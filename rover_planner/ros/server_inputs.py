@@ -20,9 +20,9 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import stamp_text
-from rover_planner.maps.living_map import MapSnapshot
-from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.living_map import MapSnapshot
+from rover_planner.planning.answering.map_keeper import MapKeeper
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import MAX_AGE, TraverseService
@@ -52,8 +52,6 @@ class ServerInputs:
         Raises:
             RoverError: Rover or map cannot be loaded, or the parameters do not agree with them.
         """
-        self.values = parameters
-        """The parameters in force."""
         self.frames = frames
         """Places of frames and sensors on the map."""
         self.service = TraverseService(load_service_settings(parameters), clock)
@@ -113,7 +111,7 @@ class ServerInputs:
         Raises:
             MessageError: A value is wrong.
         """
-        if self.values.imu_attitude:
+        if self.service.settings.parameters.imu_attitude:
             attitude = imu_to_attitude(imu, self._mounting)
             self.service.take_tilt(attitude.roll, attitude.pitch)
 
@@ -145,7 +143,8 @@ class ServerInputs:
         return self.keep(kept, topic, stamp)
 
     def _read_map(self, message: Any, source: Rigid | None) -> Terrain:
-        values, move = self.values, None if source is None else source.matrix
+        values = self.service.settings.parameters
+        move = None if source is None else source.matrix
         if not hasattr(message, "layers"):  # it is a cloud
             resolution, height = values.map_resolution, values.cell_height
             return terrain_from_point_cloud(message, resolution, height, move)
@@ -157,7 +156,7 @@ class ServerInputs:
 
     def keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
         """Keep a map in the service; return whether its content is new."""
-        frame = self.values.map_frame
+        frame = self.service.settings.parameters.map_frame
         return self.service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
 
     def may_fill_under_rover(self) -> bool:
@@ -165,8 +164,8 @@ class ServerInputs:
 
         It is once each LOOK_PERIOD, if the rover has moved since or has another map.
         """
-        now = self._clock()
-        if not self.values.fill_under_rover or now - self._looked < LOOK_PERIOD:
+        now, values = self._clock(), self.service.settings.parameters
+        if not values.fill_under_rover or now - self._looked < LOOK_PERIOD:
             return False
         standing, terrain = self.service.standing(), self.service.terrain
         if standing is None:

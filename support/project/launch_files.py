@@ -11,11 +11,18 @@ from unittest import mock
 
 from support.project.checkout import TOP
 
-MODULES = (
-    "launch", "launch.actions", "launch.launch_description_sources", "launch.substitutions",
-    "launch_ros", "launch_ros.actions", "launch_ros.parameter_descriptions",
-)  # fmt: skip
-"""What launch files import."""
+MODULES = {
+    "launch": ["LaunchContext", "LaunchDescription"],
+    "launch.actions": [
+        "DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription", "OpaqueFunction",
+    ],
+    "launch.launch_description_sources": ["PythonLaunchDescriptionSource"],
+    "launch.substitutions": ["LaunchConfiguration"],
+    "launch_ros": [],
+    "launch_ros.actions": ["Node", "SetRemap"],
+    "launch_ros.parameter_descriptions": ["ParameterValue"],
+}  # fmt: skip
+"""Classes that launch files import, by module."""
 
 
 class Kept(SimpleNamespace):
@@ -31,10 +38,10 @@ class Kept(SimpleNamespace):
 
 @contextlib.contextmanager
 def launch_modules() -> Iterator[None]:
-    """Put stand-ins for launch and launch_ros, with any class, where imports look first."""
+    """Put stand-ins for launch and launch_ros where imports look first."""
     made = {name: ModuleType(name) for name in MODULES}
-    for module in made.values():
-        module.__getattr__ = lambda name: type(name, (Kept,), {})  # type: ignore[method-assign]
+    for name, classes in MODULES.items():
+        vars(made[name]).update({one: type(one, (Kept,), {}) for one in classes})
     with mock.patch.dict(sys.modules, made):
         yield
 

@@ -99,9 +99,8 @@ def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(TOP), "NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-m", demo_module.COMPILER]
     with subprocess.Popen(command, env=environment) as compiler:
-        kept = wait_until(lambda: list(tmp_path.rglob("*.nbc")), "a kernel", 240.0)
-        assert kept and compiler.poll() is None  # it goes on for more than a minute
-        compiler.kill()
+        wait_until(lambda: list(tmp_path.rglob("*.nbc")), "a kernel", 240.0)
+        compiler.kill()  # it would go on for more than a minute
 
 
 @pytest.mark.parametrize("out", ["picture.txt", "map.npz/demo.png"])

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of answers are drawn for accepted and refused paths, on maps with and without holes."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -15,6 +13,7 @@ from rover_planner.figures.path_picture import _draw_uses, draw_path
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.rovers import LSR1
@@ -43,7 +42,9 @@ def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_p
 
 def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(tmp_path):
     ground = make_terrain(lambda x, y: 0.0 * x, half=2.0)
-    question = SearchQuery(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), PathQueryOptions())
+    question = SearchQuery(
+        Site(LSR1, ground, PathQueryOptions()), (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+    )
     answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))
     draw_path(tmp_path / "plan.svg", question, answer, "hill.npz")
     text = (tmp_path / "plan.svg").read_text()
@@ -65,7 +66,7 @@ def test_forces_that_no_verdict_asks_for_are_shaded(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
     ledge = make_terrain(lambda x, y: 0.06 * (x < -2.5), half=4.5)
-    options = dataclasses.replace(COARSE, count=1, waypoint_spacing=0.02)
+    options = PathQueryOptions(count=1)
     for goal, is_beyond in (((-3.2, 0, 0), False), ((-1.5, 0, 0), True)):
         answer = answer_path_query(LSR1, ledge, (-3.5, 0, 0), goal, options)
         falls = answer.chosen.prediction.falling.any(axis=1)

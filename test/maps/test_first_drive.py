@@ -8,9 +8,9 @@ import numpy as np
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.maps.ground_beneath import Standing
-from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, MERGE
+from rover_planner.planning.answering.map_keeper import MapKeeper
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.simulator.simulation import Simulation
 from support.grounds import make_terrain, waves

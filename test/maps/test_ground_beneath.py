@@ -8,9 +8,9 @@ from rover_physics import judge_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
-from rover_planner.maps.living_map import LivingMap
-from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.living_map import LivingMap
+from rover_planner.planning.answering.map_keeper import MapKeeper
 from support.grounds import make_terrain, raised, rocky, waves
 from support.rough_grounds import with_std
 from support.rovers import LSR1, M2020

@@ -8,9 +8,9 @@ from rover_physics import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.layers import lay_onto
-from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.maps.moved_map import MAX_LEAN, Move, move_map
 from rover_planner.parameters.traverse_server import MERGE, TraverseServerParameters
+from rover_planner.planning.answering.map_keeper import MapKeeper
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, waves
 from support.rovers import LSR1

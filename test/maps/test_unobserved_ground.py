@@ -9,8 +9,15 @@ import pytest
 
 from rover_physics import Terrain
 from rover_planner.maps.layers import FOOTPRINT, CellSources
-from rover_planner.maps.unobserved_ground import SEEN, UNSEEN, ObservedGround, observed_ground
-from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
+from rover_planner.maps.unobserved_ground import (
+    ALLOW,
+    ALLOW_FOOTPRINT,
+    REFUSE,
+    SEEN,
+    UNSEEN,
+    ObservedGround,
+    observed_ground,
+)
 from support.rovers import LSR1
 
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])

@@ -35,7 +35,7 @@ def test_positions_are_found_by_name_in_any_order_and_others_are_not_looked_at()
     [
         (["rocker_left", "bogie_left"], [0.1], "1 positions for 2 names"),
         (["rocker_left", "rocker_left"], [0.1, 0.2], "names rocker_left twice"),
-        (["camera", "rocker_left"], [0.0, math.nan], "position nan of rocker_left"),
+        (["rocker_left", "bogie_left"], [0.0, math.nan], "position nan of bogie_left"),
     ],
 )
 def test_joint_states_that_disagree_or_are_not_finite_are_refused(names, positions, text):

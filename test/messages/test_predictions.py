@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker
 from msg_adapters.errors import MessageError
 from msg_adapters.paths import settled_path
 from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
-from msg_adapters.results.markers import IMPASSABLE, PASSABLE, WITH_SPEED_SERVOS, path_markers
+from msg_adapters.results.markers import GREEN, LIME, RED, path_markers
 from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
 from rover_physics import Terrain, judge_path
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -106,7 +106,7 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
     assert markers[0].action == Marker.DELETEALL
     line = by_namespace["path"]
     assert len(line.points) == len(line.colors) == 10
-    assert line.colors == [PASSABLE] * 8 + [IMPASSABLE] * 2
+    assert line.colors == [GREEN] * 8 + [RED] * 2
     assert line.points[-1].z == prediction.position[49, 2]
     assert by_namespace["reason"].text == "off the map"
     assert by_namespace["failing_pose"].pose.position.x == prediction.poses[50, 0]
@@ -118,7 +118,7 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
     assert all(marker.header.stamp == STAMP for marker in markers)
     classes = [classification.WITH_SPEED_SERVOS] * 60
     drawn = path_markers(prediction, [""] * 60, np.arange(0, 60, 7), HEADER, classes)
-    assert WITH_SPEED_SERVOS in next(m for m in drawn.markers if m.ns == "path").colors
+    assert LIME in next(m for m in drawn.markers if m.ns == "path").colors
 
 
 def test_every_entry_of_a_verdict_becomes_a_key_and_a_value():

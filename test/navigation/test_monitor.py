@@ -103,7 +103,7 @@ def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_
     service.take_terrain(large)
     found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
     assert found.state == STOPPED
-    assert found.judgement.judge.terrain.elevation.size < 0.2 * large.elevation.size
+    assert found.judgement.judge.site.terrain.elevation.size < 0.2 * large.elevation.size
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,9 @@ def test_on_learned_ground_the_rest_is_judged_once_too():
 def test_a_place_that_is_marked_ahead_stops(service, monitor):
     marked = MarkedPlaces((MarkedPlace(-1.5, 0.0, 0.3, "stuck there", "today"),))
     here = sight(service, STRAIGHT[0], 10.0)
-    found = monitor.look(replace(here, snapshot=replace(here.snapshot, marked=marked)))
+    assert monitor.look(here).state == WATCHING
+    there = replace(here, time=20.0, snapshot=replace(here.snapshot, marked=marked))
+    found = monitor.look(there)
     assert (found.state, found.judgement.code) == (STOPPED, MARKED_CODE)
 
 

@@ -111,6 +111,8 @@ def test_nobody_listens_so_nothing_is_made_and_who_comes_gets_the_latest(ros, to
     for number in range(3, 6):
         topic.publish(lambda number=number: Int32(data=number))
     wait_until(lambda: heard == [2, 3, 4, 5], "all in order")
+    _, late = listen(ros, "late_listener")
+    wait_until(lambda: late == [5], "the latest alone")
 
 
 def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(ros, topic):

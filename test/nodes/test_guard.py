@@ -16,7 +16,7 @@ from rclpy.timer import Timer
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from rover_planner.ros.guard import Guard, GuardedExecutor
+from rover_planner.ros.guard import Guard, GuardedExecutor, Handover
 from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -148,6 +148,18 @@ def test_an_error_is_logged_once_with_its_trace_and_counted():
     assert "Traceback" in lines[0] and "ZeroDivisionError" in lines[0]
     assert guard.recent(20.0) and not Guard(lines).recent(20.0)
     assert len(guard.report("x", ValueError("y" * 10_000))) <= 300
+
+
+def test_functions_of_other_threads_run_in_order_and_an_error_ends_nothing(ros):
+    node = Fragile(ros.context)
+    node.timer.cancel()
+    handover, told = Handover(node, node.guard), []
+    for k in range(50):
+        handover.call(lambda k=k: told.append(k))
+        handover.call(lambda: 1 / 0)
+    ros.spin(node)
+    wait_until(lambda: len(told) == 50, "the calls")
+    assert told == list(range(50))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cl
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.map_intake import MapIntake
+from rover_planner.ros.map_intake import MapIntake, are_gridded_alike
 from support.rough_grounds import plane
 from support.rovers import LSR1
 from support.waiting import wait_until
@@ -32,7 +32,7 @@ class Intake(MapIntake):
         self.made: list[MapContactFinder] = []
         self.renewed: list[Any] = []
         logger = SimpleNamespace(error=self.errors.append)
-        super().__init__(logger, TraverseServerParameters(), FRAMES)
+        super().__init__(logger, FRAMES)
 
     def prepare(self, message, source):
         self.made.append(MapContactFinder(LSR1, terrain_from_point_cloud(message)))
@@ -55,8 +55,9 @@ def test_a_map_is_prepared_once_and_again_where_it_or_a_parameter_changes():
     intake.wait_for(2)
     first, second = (one.terrain.elevation.shape for one in intake.made)
     assert second > first
-    assert not intake.take_parameters(TraverseServerParameters(friction=0.5))
-    assert intake.take_parameters(TraverseServerParameters(map_resolution=0.2))
+    before = TraverseServerParameters()
+    assert are_gridded_alike(before, TraverseServerParameters(friction=0.5))
+    assert not are_gridded_alike(before, TraverseServerParameters(map_resolution=0.2))
     intake.repeat()
     intake.wait_for(3)
     intake.close()

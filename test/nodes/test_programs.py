@@ -137,6 +137,8 @@ def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd, monkeyp
     assert MODULES[name].main(words) == 2
     err = capfd.readouterr().err
     assert said in err.strip().splitlines()[-1] and "Traceback" not in err and "/rcl/" not in err
+    if name == "mission_planner":  # the nodes log it
+        assert err.startswith(f"{name}: ") and err.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", PROGRAMS)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
@@ -18,6 +19,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.identity import path_hash
 from msg_adapters.paths import poses_path
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics import Terrain, judge_path, load_terrain
@@ -140,18 +142,22 @@ def test_a_drive_is_judged_in_stretches_and_answers_are_recorded_as_a_server_pub
         np.testing.assert_array_equal(np.array(loads.data).reshape(-1, 6), file["wheel_loads"])
 
 
-def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
+def test_each_new_map_is_asked_for_a_goal_from_the_odometry_and_not_for_a_path(tmp_path, capsys):
     flat = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
     messages = [
         ("/odometry", odometry_at((1.0, 0.0, 0.0))),
         ("/elevation_cloud", cloud(waves())),
         ("/elevation_cloud", cloud(waves())),  # the same again
+        ("/traverse_server/path", path_to(2.0)),
         ("/elevation_cloud", cloud(flat, BEGIN + 1)),
     ]
     bag = record(tmp_path / "bag", messages)
     answers, _ = replay(capsys, bag, tmp_path / "out", "--goal", "3,0.2,0")
-    assert [answer["kind"] for answer in answers] == ["can_traverse"] * 2
-    assert [answer["map"] for answer in answers] == ["map_001.npz", "map_002.npz"]
+    assert [answer["kind"] for answer in answers] == ["can_traverse", "check_path", "can_traverse"]
+    assert [answer["map"] for answer in answers[::2]] == ["map_001.npz", "map_002.npz"]
+    verdicts = published(tmp_path / "out", "verdict", DiagnosticArray)
+    told = [{one.key: one.value for one in verdict.status[0].values} for _, verdict in verdicts]
+    assert [one["path_hash"] for one in told] == ["", path_hash(path_to(2.0)), ""]
     first = np.load(tmp_path / "out" / "001_can_traverse.npz")["poses"]
     np.testing.assert_allclose(first[[0, -1], 0], [1.0, 3.0], atol=1e-6)
 

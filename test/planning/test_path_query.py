@@ -36,7 +36,7 @@ def test_turns_on_the_spot_before_a_failure_are_no_distance():
 
 def test_the_safer_path_wins_and_energy_decides_between_equals():
     answer = path_query.answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
-    assert answer.nearest == 0 and "5 of 5" in answer.explain()  # straight ahead
+    assert answer.choice == 0 and "5 of 5" in answer.explain()  # straight ahead
     risky, safe, thrifty = (
         replace(
             one,
@@ -47,6 +47,6 @@ def test_the_safer_path_wins_and_energy_decides_between_equals():
             answer.candidates, (0.5, 0.3, 0.31), (10.0, 90.0, 80.0), strict=False
         )
     )
-    assert path_query.choose((risky, safe, thrifty)).nearest == 2
+    assert path_query.choose((risky, safe, thrifty)).choice == 2
     refused = replace(thrifty, verdict=replace(thrifty.verdict, traversable=False))
-    assert path_query.choose((risky, safe, refused)).nearest == 1
+    assert path_query.choose((risky, safe, refused)).choice == 1

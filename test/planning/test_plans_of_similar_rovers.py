@@ -9,6 +9,7 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from support.rough_grounds import bouldered, enlarged, rocky
 from support.rovers import LSR1, M2020, SIMILAR, similar
 from support.services import load_settings
@@ -23,14 +24,16 @@ def plan(rover: Rover, seed: int):
     size = rover.wheel.radius / LSR1.wheel.radius
     units = [size, size, 1.0]
     found = find_path(
-        SearchQuery(rover, enlarged(bouldered(seed), size), START * units, GOAL * units, SURE),
+        SearchQuery(
+            Site(rover, enlarged(bouldered(seed), size), SURE), START * units, GOAL * units
+        ),
         FIRST,
     )
     yield found.outcome, found.expanded, found.edges_judged, found.cost / size
     yield None if found.path is None else found.path.poses / units
-    judge = PathJudge(rover, enlarged(rocky(seed), size), SURE)
+    judge = PathJudge(Site(rover, enlarged(rocky(seed), size), SURE))
     answer = judge.search(START * units, GOAL * units, 0.35 * size)
-    yield answer.nearest, answer.alternatives_tried, answer.goal_offset / size
+    yield answer.choice, answer.alternatives_tried, answer.goal_offset / size
     for candidate in answer.candidates:
         yield candidate.verdict.codes
         yield candidate.poses / units

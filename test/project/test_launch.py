@@ -176,10 +176,33 @@ def test_ros2_control_has_what_the_urdf_tells_and_the_controller_reads_and_comma
         assert ours in re.findall(r"[~/a-z_]+", said) and theirs.split("/")[0] in spawned
 
 
+NAV2 = {
+    bool: {"enabled", "rolling_window", "track_unknown_space", "trinary_costmap",
+           "map_subscribe_transient_local", "subscribe_to_updates"},
+    int: {"type", "lethal_cost_threshold", "unknown_cost_value"},
+    float: {"base", "multiplier"},
+    str: {"global_frame", "robot_base_frame", "plugin", "map_topic", "mask_topic",
+          "filter_info_topic"},
+    list: {"plugins", "filters"},
+}  # fmt: skip
+"""Parameters of Nav2 1.3.13 (Jazzy) by their type, as its sources have them: it is not on PyPI."""
+
+
+def leaves_of(content):
+    """Yield name and value of all parameters."""
+    for name, value in content.items():
+        yield from leaves_of(value) if isinstance(value, dict) else [(name, value)]
+
+
 @pytest.mark.parametrize("file", ["hazard_layer.yaml", "hazard_filter.yaml"])
-def test_the_files_for_nav2_read_the_topic_of_the_server(file):
+def test_the_files_for_nav2_have_its_parameters_and_read_the_topic_of_the_server(file):
     text = (CONFIG / "nav2" / file).read_text(encoding="utf-8")
-    assert "global_costmap" in yaml.safe_load(text)
+    content = yaml.safe_load(text)
+    costmap = content["global_costmap"]["global_costmap"]["ros__parameters"]
+    (name,) = costmap.get("plugins") or costmap["filters"]
+    plugins = "nav2_costmap_2d::StaticLayer", "nav2_costmap_2d::KeepoutFilter"
+    assert costmap[name]["plugin"] in plugins
+    assert {one for one, value in leaves_of(content) if one not in NAV2[type(value)]} == set()
     (read,) = re.findall(r"\b(?:map|mask)_topic: (\S+)", text)
     said = PROGRAMS["traverse_server"].topics.replace("~", "/traverse_server")
     assert read in said.split("publishes")[1]

@@ -177,6 +177,14 @@ def test_a_rover_that_is_too_slow_is_pushed_along_its_curve(policy):
         assert (wanted * torques > 1e-3).all(), (command, torques)
 
 
+def test_a_rover_that_turns_unasked_is_turned_back():
+    rig = Rig()
+    rig.roll(1.0)
+    rig.rates = np.array([0.0, 0.0, 0.05])  # to the left
+    right, left = np.split(rig.run(30).torques, 2)
+    assert right.max() < -1e-3 and left.min() > 1e-3
+
+
 def test_straight_wheels_do_not_push_a_rover_that_is_to_turn_on_the_spot():
     rig = Rig((0.0, 0.1))
     rig.turn_wheels(0.0)

@@ -89,15 +89,12 @@ def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     assert not ended["can_ask"] and ended["words"] == "" and ended["rows"]
 
 
-def test_a_search_that_is_stopped_before_its_first_result_tells_so(page):
+def test_a_search_that_is_stopped_tells_so_and_one_ends_when_nobody_looks_at_its_path(page):
     page.hear({"ask": "advise"})
     page.hear({"ask": "cancel"})
     words = "the search was stopped before it found anything"
     wait_until(lambda: page.channel.parts["advice"]["words"] == words, "the words")
     assert page.channel.parts["advice"]["can_ask"] and page._advised.advice is None
-
-
-def test_a_search_ends_when_nobody_looks_at_its_path_any_more(page):
     page.hear({"ask": "advise"})
     wait_until(lambda: page._advice.progress, "the search")
     page.hear({"ask": "value", "label": "friction [-]", "value": 0.7})

@@ -224,9 +224,7 @@ def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond
     path = judged_on(gap)
     failure, (ground, *_) = path.failure, paths.describe_limits(path, None)["lanes"]
     assert failure is not None and failure.code == "unknown_ground"
-    assert (
-        ground["code"] == "ground" and ground["now"]["y"][0][-1] == paths.MAX_USE
-    )  # not infinite
+    assert (ground["code"], ground["now"]["y"][0][-1]) == ("ground", paths.MAX_USE)
     assert np.isnan(failure.state.wheel_loads).all() and failure.link.startswith("front")
     assert failure.headline.startswith("unknown ground, front")
     np.testing.assert_allclose(failure.state.attitude[:2], 0.0)

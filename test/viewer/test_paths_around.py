@@ -27,11 +27,6 @@ def walled_session(height, goal=(-1.1, 0.0, 0.0), *, ends_at_first=True):
     return session_on(ground, (-1.6, 0.0, 0.0), goal, search=search)
 
 
-def whole_wall(x, y):
-    """Return waves with a wall of 0.5 m along y at x = 0."""
-    return waves(x, y) + 0.5 * (np.abs(x) < 0.2)
-
-
 def list_steps(session: ViewSession) -> list[str | int]:
     """Return what is begun, and how many paths each result has, when all is judged."""
     steps = judge_steps(session.wanted)
@@ -66,7 +61,7 @@ def test_the_first_path_around_is_shown_before_a_better_one_is_searched():
 
 
 def test_where_there_is_no_path_the_reason_is_told():
-    session = walled_session(whole_wall, GOAL)
+    session = walled_session(lambda x, y: waves(x, y) + 0.5 * (np.abs(x) < 0.2), GOAL)
     session.ask()
     shown = session.shown
     assert shown.around.outcome == NO_WAY and len(shown.paths) == 5

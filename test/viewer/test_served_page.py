@@ -61,14 +61,9 @@ def told(page: Page, name: str):
     return page.channel.parts.get(name)
 
 
-def change_friction(page: Page, friction: float) -> None:
-    """Change the friction as a slider does."""
-    page.hear({"ask": "value", "label": FRICTION, "value": friction})
-
-
 def set_friction(page: Page, friction: float) -> None:
-    """Change the friction, and wait until that is judged and shown."""
-    change_friction(page, friction)
+    """Change the friction as a slider does, and wait until that is judged and shown."""
+    page.hear({"ask": "value", "label": FRICTION, "value": friction})
     wait_until(lambda: page.session.wanted.rover.friction == friction, "the value")
     wait_for_rest(page)
 
@@ -147,7 +142,7 @@ def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
 def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_be_cancelled(page):
     session, shown = page.session, page.session.shown
     with held(page.session):
-        change_friction(page, 0.75)
+        page.hear({"ask": "value", "label": FRICTION, "value": 0.75})
         wait_until(lambda: told(page, "verdict")["judging"], "the notice")
         assert told(page, "verdict")["old"].startswith("judging path")
         assert session.shown is shown
@@ -289,7 +284,7 @@ def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
 # Errors.
 
 
-def test_a_drawing_that_fails_is_told_and_stops_no_other_and_none_is_drawn_twice(page):
+def test_what_fails_is_told_and_stops_no_other_and_what_is_drawn_is_not_drawn_again(page):
     done, ground, rover = [], object(), object()
 
     def ask_for_four() -> None:
@@ -301,9 +296,6 @@ def test_a_drawing_that_fails_is_told_and_stops_no_other_and_none_is_drawn_twice
     ask(page, ask_for_four)
     assert done == ["paths", "rover"]
     assert "ZeroDivisionError" in page.errors.pop("the plots")
-
-
-def test_a_failed_request_is_told_until_a_request_succeeds(page):
     page.requests.put(lambda: 1 / 0)
     error = ["the last request failed", "ZeroDivisionError: division by zero"]
     wait_until(lambda: told(page, "errors") == [error], "the notice")

@@ -29,6 +29,8 @@ DECIMALS = 12
 MIRROR = np.array([1.0, -1.0, 1.0])
 ARM_TOLERANCE = 1e-3
 """Largest distance of a joint from where the arm's model has it [m]."""
+ROUNDED_MASS = 1e-12
+"""Mass up to which a part has none: what rounding leaves of a difference [kg]."""
 LEVEL = 1e-6
 """Height difference of wheels that counts as none [m]."""
 MAX_ANGLE = 0.1
@@ -291,19 +293,21 @@ class _Reading:
 
     def _wheel_centre(self, wheel: str) -> Floats:
         """Return the middle of a wheel's cylinder; without one, the origin of its joint [m]."""
-        for _, place in self._cylinders(wheel):
-            return place[:3, 3]
-        return self._posture.point(self._wheels[wheel].child)
+        tyre = self._tyre(wheel)
+        return self._posture.point(self._wheels[wheel].child) if tyre is None else tyre[1][:3, 3]
 
-    def _cylinders(self, wheel: str) -> list[tuple[Solid, Floats]]:
-        return self._posture.solids(self._robot.links_on(self._wheels[wheel]), "cylinder")
+    def _tyre(self, wheel: str) -> tuple[Solid, Floats] | None:
+        """Return the cylinder of a wheel with the largest radius; others are hubs or motors."""
+        links = self._robot.links_on(self._wheels[wheel])
+        cylinders = self._posture.solids(links, "cylinder")
+        return max(cylinders, key=lambda one: one[0].size[0], default=None)
 
     def _wheel(self) -> dict[str, float]:
         """Return size, mass and drive of the wheels."""
         found = {"mass": self._wheel_mass()}
-        cylinders = [self._cylinders(wheel) for wheel in WHEELS]
-        if all(cylinders):
-            sizes = np.array([cylinder[0][0].size for cylinder in cylinders])
+        tyres = [tyre for tyre in map(self._tyre, WHEELS) if tyre is not None]
+        if len(tyres) == len(WHEELS):
+            sizes = np.array([tyre[0].size for tyre in tyres])
             if np.ptp(sizes, axis=0).max() > 1e-3:
                 raise RoverFileError("wheels have cylinders of several sizes; all must be alike")
             found["radius"], found["width"] = sizes.mean(axis=0).tolist()
@@ -393,7 +397,7 @@ class _Reading:
                 for side in SIDES
             }
             found[name] = {
-                "mass": mass if mass > 1e-12 else 0.0,
+                "mass": mass if mass > ROUNDED_MASS else 0.0,
                 "com": self._mean(("masses", name, "com"), coms),
             }
         return found
@@ -497,7 +501,7 @@ def _check_below(key: str, joint: Joint, above: Joint, links: set[str]) -> None:
 
 def _com(masses: Floats, missing: Floats) -> Floats:
     """Return the centre of mass (3,) [m] of `Posture.masses`; `missing` if there is no mass."""
-    return masses[1:] / masses[0] if masses[0] > 0.0 else missing
+    return masses[1:] / masses[0] if masses[0] > ROUNDED_MASS else missing
 
 
 def _finite(**limits: Any) -> dict[str, Any]:

@@ -5,14 +5,19 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.angles import wrap
+from rover_planner.nodes.mission.errors import DriveFailedError
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
+
+if TYPE_CHECKING:
+    from rover_planner.nodes.mission.rover_link import RoverLink
+    from rover_planner.nodes.mission.server_client import Answer, ServerClient
 
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
@@ -29,29 +34,6 @@ STILL = 0.02
 """Motion below which a rover stands [m]; a turn counts as in `WatchedPath`."""
 SAME_PLACE = 0.1
 """Distance below which two stops are at one place [m]."""
-
-
-class DriveFailedError(Exception):
-    """The rover did not reach the end of its path; the text names the reason."""
-
-
-class RoverClient(Protocol):
-    """The part of server and rover that a drive needs."""
-
-    def ask(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
-        """Return `traversable`, `reason` and the `poses` of a path from start to goal."""
-
-    def send_path(self, poses: Poses) -> None:
-        """Let the rover follow a path."""
-
-    def check(self, poses: Poses) -> tuple[str, str]:
-        """Return code and reason why the server refuses a path now, empty if it passes."""
-
-    def has_ended(self) -> bool | None:
-        """Return whether the follower is at the end of its path; None if it never says so."""
-
-    def wait_for_pose(self, is_wanted: Callable[[Poses], bool], seconds: float) -> Poses:
-        """Return the first measured pose (3,) that is wanted, or the last one in time."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +75,8 @@ class Drive:
 
     def __init__(
         self,
-        client: RoverClient,
+        server: "ServerClient",
+        rover: "RoverLink",
         goal: Sequence[float],
         settings: DriveSettings,
         report: Callable[[str], object],
@@ -101,12 +84,14 @@ class Drive:
         """Begin.
 
         Args:
-            client: Server and rover.
+            server: Finds the plans.
+            rover: Follows them.
             goal: Where to, x, y [m] and yaw [rad].
             settings: How it is watched.
             report: Takes events in words.
         """
-        self._client, self._goal, self._settings, self._report = client, goal, settings, report
+        self._server, self._rover, self._goal = server, rover, goal
+        self._settings, self._report = settings, report
         self._deadline = time.monotonic() + settings.timeout
         self._stopped_at, self._stops = np.full(3, np.inf), 0
         self._trail: Poses = np.zeros((0, 3))
@@ -145,43 +130,43 @@ class Drive:
                 f"{MAX_STOPS} other paths led nowhere from {_describe(pose)}: {stretch.hindrance}"
             )
         answer = None if stops >= 2 or stretch.is_marked else self._ask(pose)
-        if answer is None or not answer["traversable"]:
+        if answer is None or not answer.traversable:
             went_back = self._go_back()
             if went_back or answer is None:
                 pose = self._stand(pose)
                 answer = self._ask(pose)
-        if not answer["traversable"]:
-            raise DriveFailedError(f"no path on from {_describe(pose)}: {answer['reason']}")
+        if not answer.traversable:
+            raise DriveFailedError(f"no path on from {_describe(pose)}: {answer.reason}")
         self._report(f"another plan from {_describe(pose)}")
-        return np.array(answer["poses"])
+        return np.array(answer.poses)
 
-    def _ask(self, pose: Poses) -> dict[str, Any]:
+    def _ask(self, pose: Poses) -> "Answer":
         """Ask for a path to the goal from a pose (3,)."""
-        return self._client.ask(pose.tolist(), self._goal)
+        return self._server.ask(pose.tolist(), self._goal)
 
     def _follow(self, plan: Poses) -> Stretch:
         """Follow a plan (n, 3) to its end, or to where something hinders the rover."""
         path, index, settings = WatchedPath(plan), 0, self._settings
         standstill, rest = Standstill(settings.patience), Standstill(REST_TIME)
-        self._client.send_path(plan)
+        self._rover.send_path(plan)
 
         def is_there(pose: Poses) -> bool:
             nonlocal index
             index = path.find_place(pose, index).index
-            rests, ended = rest.is_reached(pose, time.monotonic()), self._client.has_ended()
+            rests, ended = rest.is_reached(pose, time.monotonic()), self._rover.has_ended()
             if ended is not None:
                 return ended
             return rests and path.is_end(index) and not self._describe_miss(pose, plan[-1])
 
         while True:
-            pose = self._client.wait_for_pose(is_there, settings.period)
+            pose = self._rover.wait_for_pose(is_there, settings.period)
             behind = plan[: index + 1]
             if is_there(pose):
                 return Stretch(pose, self._describe_miss(pose, plan[-1]), False, behind)
-            code, refused = self._client.check(plan[index:])
-            if refused:
-                text = f"the rest of the plan is refused: {refused}"
-                return Stretch(pose, text, code == MARKED_CODE, behind)
+            rest_of_plan = self._server.check(plan[index:])
+            if not rest_of_plan.traversable:
+                text = f"the rest of the plan is refused: {rest_of_plan.reason}"
+                return Stretch(pose, text, rest_of_plan.code == MARKED_CODE, behind)
             now = time.monotonic()
             if standstill.is_reached(pose, now):
                 text = f"the rover has stood for {settings.patience:g} s on its way"
@@ -213,7 +198,7 @@ class Drive:
         lengths = WatchedPath(self._trail).distances
         is_back = lengths >= lengths[-1] - RETREAT
         back, self._trail = self._trail[is_back][::-1], self._trail[~is_back]
-        if self._client.check(back)[1]:
+        if not self._server.check(back).traversable:
             return False
         self._report(f"back to {_describe(back[-1])}")
         return not self._follow(back).hindrance
@@ -223,11 +208,11 @@ class Drive:
 
         A plan from where it still moved would begin beside it, and a turn on the spot stay there.
         """
-        self._client.send_path(pose[None, :])
+        self._rover.send_path(pose[None, :])
         rest = Standstill(REST_TIME)
         end = time.monotonic() + LONGEST_BRAKING
         while time.monotonic() < end and not rest.is_reached(pose, time.monotonic()):
-            pose = self._client.wait_for_pose(lambda _: False, LOOK_TIME)
+            pose = self._rover.wait_for_pose(lambda _: False, LOOK_TIME)
         return pose
 
 

@@ -3,7 +3,6 @@
 
 import math
 import time
-from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
@@ -19,7 +18,6 @@ from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.shared import STOP
@@ -27,7 +25,7 @@ from rover_planner.parameters.traction_controller import TractionControllerParam
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
-from rover_planner.ros.map_intake import CLOUD, MapIntake
+from rover_planner.ros.map_intake import CLOUD, MapIntake, are_gridded_alike
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import joints_qos, newest_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
@@ -174,23 +172,23 @@ class TractionMaps(MapIntake):
     def __init__(
         self,
         node: RoverNode[TractionControllerParameters],
-        rover: Callable[[], Rover],
+        service: TractionService,
         frames: NodeFrames,
     ):
         """Begin without a map.
 
         Args:
             node: The node.
-            rover: Returns the rover for which maps are prepared.
+            service: Knows rover and parameters for which maps are prepared.
             frames: Knows where the frames of clouds are on the map.
         """
-        self._rover = rover
+        self._service = service
         self._ready: MapContactFinder | None = None
-        super().__init__(node.get_logger(), node.values, frames)
+        super().__init__(node.get_logger(), frames)
 
-    def apply(self, values: TractionControllerParameters) -> None:
+    def apply(self, before: TractionControllerParameters) -> None:
         """Prepare the last map again if a parameter of it has changed."""
-        if self.take_parameters(values):
+        if not are_gridded_alike(before, self._service.settings.parameters):
             self.repeat()
 
     def take(self) -> MapContactFinder | None:
@@ -200,6 +198,7 @@ class TractionMaps(MapIntake):
 
     def prepare(self, cloud: Any, source: Rigid | None) -> None:
         """Prepare a map from a cloud; called in the thread."""
-        values, move = self.values, None if source is None else source.matrix
+        settings, values = self._service.settings, self._service.settings.parameters
+        move = None if source is None else source.matrix
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
-        self._ready = MapContactFinder(self._rover(), terrain)
+        self._ready = MapContactFinder(settings.rover, terrain)

@@ -53,9 +53,11 @@ class TractionTopics:
             self.velocities.publish(self._to_message(rates))
         self.commands.publish(self._to_message(torques))
         if self._last_state != (state, brake):
-            self._last_state = state, brake
+            told = self._last_state = state, brake
             self.brake.publish(Bool(data=brake))
             self.state.publish(String(data=state))
+            if self._last_state is not told:  # another thread wrote meanwhile: which came last?
+                self._last_state = None
 
     def _to_message(self, values: Floats) -> Float64MultiArray:
         """Return values of the wheels (6,) in the order and with the signs of messages."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rover_physics.names import EQUAL
 from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
-from rover_physics.traversability.verdict import BOUNDS, EXTREMES
+from rover_physics.traversability.verdict import BOUND_EXTREMES, EXTREMES
 from rover_planner.maps.unobserved_ground import UnobservedShare
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_query import Candidate, PathAnswer
@@ -20,7 +20,7 @@ from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
 
-REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS, "failure_chance")
+REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUND_EXTREMES, "failure_chance")
 """Fields of a verdict that a report has."""
 
 
@@ -122,9 +122,11 @@ class PathJudgement:
     @cached_property
     def ground(self) -> UnobservedShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
-        if self.candidate is None or self.judge is None or self.judge.unobserved_check is None:
+        if self.candidate is None or self.judge is None:
             return None
-        return self.judge.unobserved_check.share(self.candidate)
+        site = self.judge.site
+        seen = site.unobserved_check.seen
+        return None if seen is None else seen.share(site.rover, self.candidate.poses)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

@@ -60,7 +60,7 @@ class SearchWatch:
                 {
                     "found": progress.best is not None,
                     "cost": progress.cost,
-                    "bound": progress.bound,
+                    "bound": progress.least_cost,
                     "edges_judged": progress.judged,
                     "seconds": seconds,
                 }

@@ -21,12 +21,13 @@ from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import densify
-from rover_planner.planning.path_query import Candidate, PathAnswer, Pose, add_path
+from rover_planner.planning.path_query import Candidate, PathAnswer, add_path
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.lattice_search import SearchProgress
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
 from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.search.site import Site
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
 from rover_planner.planning.verdict_report import SuspensionReport
 
@@ -45,6 +46,12 @@ class GivenPath:
     """`msg_adapters.identity.path_hash` of the message."""
     stamp: str = ""
     """Stamp of the message, "seconds.nanoseconds"."""
+    code: str = "no_path"
+    """Code of the refusal."""
+
+    def judge(self, known: "Snapshot") -> PathJudgement:
+        """Judge whether the rover can drive it; errors are those of `Snapshot.check_path`."""
+        return replace(known, path=self).check_path().complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,17 +110,19 @@ class Snapshot:
         refused = self.refuse_map()
         if refused is not None:
             return refused
-        judge, ends = self._judge(), (np.asarray(start, float), np.asarray(goal, float))
-        start_is_on_map, goal_is_on_map = (judge.terrain.contains(*end[:2]) for end in ends)
+        site, ends = self._site(), (np.asarray(start, float), np.asarray(goal, float))
+        query = SearchQuery(site, *ends, tolerance)
+        start_is_on_map, goal_is_on_map = (site.terrain.contains(*end[:2]) for end in ends)
         are_on_map = start_is_on_map and goal_is_on_map
         may_search = are_on_map or (start_is_on_map and self.settings.lattice.frontier)
         planner = self.settings.parameters.planner
         if planner == LATTICE:
             if may_search:
-                return self._search_around(judge, ends, None)
+                return self._search_around(query, None)
             tolerance = 0.0
         if not (are_on_map or tolerance):  # no candidate helps: one tells as much as all
-            judge = replace(judge, options=judge.options.change(count=1))
+            site = replace(site, options=site.options.change(count=1))
+        judge = PathJudge(site)
         search = judge.search(*ends, tolerance)
         judged = self._describe(judge, search.chosen, search)
         if not are_on_map and not judged.traversable:
@@ -124,29 +133,20 @@ class Snapshot:
         is_final = judged.traversable or starts_unobserved or not may_search
         if is_final or planner == FAN:
             return judged
-        return self._search_around(judge, ends, judged)
+        return self._search_around(query, judged)
 
-    def _search_around(
-        self, judge: PathJudge, ends: tuple[Pose, Pose], refused: PathJudgement | None
-    ) -> PathJudgement:
+    def _search_around(self, query: SearchQuery, refused: PathJudgement | None) -> PathJudgement:
         """Search a path around obstacles.
 
         Args:
-            judge: The model.
-            ends: Start and goal.
+            query: The query.
             refused: The judgement on the candidates; None if none were tried.
         """
-        query = SearchQuery(
-            judge.rover,
-            judge.terrain,
-            *ends,
-            judge.options,
-            judge.unobserved_check,
-            self.marked,
-        )
         found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
         if found.path is not None:
-            search = add_path(None if refused is None else refused.search, found.path, ends[1])
+            before = None if refused is None else refused.search
+            search = add_path(before, found.path, np.asarray(query.goal))
+            judge = PathJudge(query.site)
             return replace(self._describe(judge, found.path, search), around=found)
         is_end = found.outcome in (START_REFUSED, GOAL_REFUSED)
         warning = found.warning if refused is None or not is_end else ""
@@ -173,14 +173,14 @@ class Snapshot:
         if missing is not None:
             return missing
         assert self.path.poses is not None
-        judge = self._judge()
+        judge = PathJudge(self._site())
         poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
         return self._describe(judge, judge.check(poses, stop_at_failure=stop_at_failure))
 
     def refuse_if_missing(self) -> PathJudgement | None:
         """Return a refusal if there is no path or no map to use, else None."""
         if self.path.poses is None:
-            return refusal("no_path", self.path.refusal)
+            return refusal(self.path.code, self.path.refusal)
         return self.refuse_map()
 
     def refuse_map(self) -> PathJudgement | None:
@@ -202,9 +202,9 @@ class Snapshot:
         """
         if self.known_map is None or self.measured_pose is None:
             return None
-        judge, pose = self._judge(), self.measured_pose[None, :]
-        options = judge.options.model
-        prediction, _ = judge_poses(judge.rover, judge.terrain, pose, None, options, sigmas=0)
+        site, pose = self._site(), self.measured_pose[None, :]
+        options = site.options.model
+        prediction, _ = judge_poses(site.rover, site.terrain, pose, None, options, sigmas=0)
         predicted = (*prediction.rocker_angle[0].tolist(), *prediction.bogie_angle[0].tolist())
         mismatch = {
             name: self.joints[name] - angle
@@ -216,16 +216,16 @@ class Snapshot:
         largest = max(abs(difference) for difference in mismatch.values())
         return SuspensionReport(mismatch, largest <= self.settings.parameters.suspension_tolerance)
 
-    def _judge(self) -> PathJudge:
-        """Return the model on the map, with the settings and the measured arm angles."""
+    def _site(self) -> Site:
+        """Return the rover on the map, with the settings and the measured arm angles."""
         assert self.known_map is not None
         settings, names = self.settings, self.settings.manipulator_joints
         known = {name: self.joints[name] for name in names if name in self.joints}
         is_stowed = not names or len(known) < len(names)  # until all are known
         options = settings.query.change(joint_angles=None if is_stowed else known)
         rule = settings.parameters.blind_ground
-        check = UnobservedCheck(settings.rover, self.known_map.seen, rule)
-        return PathJudge(settings.rover, self.known_map.terrain, options, check, self.marked)
+        check = UnobservedCheck(self.known_map.seen, rule)
+        return Site(settings.rover, self.known_map.terrain, options, check, self.marked)
 
     def _describe(
         self, judge: PathJudge, candidate: Candidate, search: PathAnswer | None = None

@@ -159,10 +159,6 @@ class TraverseService:
             pack_ground(terrain)
             prepare_bounds(terrain, self.settings.query.map_sigmas)
 
-    def refuse_path(self, reason: str, path_hash: str = "", stamp: str = "") -> None:
-        """Discard the path and keep the reason; later queries must not use an outdated one."""
-        self.given_path = GivenPath(None, f"the last path was refused: {reason}", path_hash, stamp)
-
     def take_ground(self, ground: LearnedGround) -> None:
         """Keep what was learned of the ground, for new questions."""
         self._ground = ground

@@ -9,6 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.angles import wrap
@@ -30,10 +31,11 @@ LARGEST_TURN = 3
 DETOUR = 1.3
 """Largest length of a curve over the distance of its ends."""
 
+MISSED_PRICE = 10.0
+"""Cost of each metre that is left from the end of a path to the goal [m of level ground]."""
+
 FRONTIER_PLACES = 48
 """Number of places at the frontier that are offered to the search."""
-FRONTIER_PRICE = 10.0
-"""Cost of each metre that is left from there to the goal [m of level ground]."""
 FRONTIER_BATCH = 1000
 """Number of poses at the frontier that the model is asked about at once."""
 
@@ -51,17 +53,17 @@ class Connection:
     """Gear in which it is driven."""
     cost: float
     """Its cost on level ground [m]."""
-    make: Callable[[], Pose]
+    make: Callable[[], Floats]
     """Makes its waypoints (n, 3)."""
     surcharge: float = 0.0
     """Cost that comes to that of driving [m]."""
 
     def piece(self, cost: float) -> Piece:
         """Return it as a piece of path with its cost [m]."""
-        return Piece(self._poses, self.gear, cost)
+        return Piece(self._poses, self.gear, cost, self.surcharge)
 
     @cached_property
-    def _poses(self) -> Pose:
+    def _poses(self) -> Floats:
         return self.make()
 
 
@@ -106,14 +108,14 @@ class _Connector:
             for k in np.lexsort((nodes, costs))[:MOST_CURVES].tolist()
         ]
 
-    def _order(self, there: Pose, gear: Gear) -> tuple[Pose, Pose]:
+    def _order(self, there: Floats, gear: Gear) -> tuple[Floats, Floats]:
         """Return first and last pose of the drive between the end and a node, or nodes (n, 3)."""
         end = self.end
         if gear == Gear.BACKWARD:
             end, there = _about(end), _about(there)
         return (there, end) if self.is_goal else (end, there)
 
-    def _drive(self, there: Pose, gear: Gear) -> np.ndarray:
+    def _drive(self, there: Pose, gear: Gear) -> Floats:
         """Return the waypoints (n, 3) of the shortest Dubins path between the end and a node."""
         first, last = self._order(there, gear)
         radius = tightest_radius(self.rover)
@@ -136,7 +138,7 @@ class _Connector:
 
 def _nodes_beside(
     nodes: Nodes, pose: Pose, reach: float, side: float
-) -> tuple[NDArray[np.int64], Pose]:
+) -> tuple[NDArray[np.int64], Floats]:
     """Return the nodes (n,) within `reach` [m] ahead of a pose (side 1) or behind it (-1).
 
     They are hardly turned; their poses (n, 3) are the second.
@@ -163,12 +165,12 @@ def _turned_nodes(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, 
         yield int(node[0]), nodes.poses(node)[0]
 
 
-def _about(pose: Pose) -> Pose:
+def _about(pose: Floats) -> Floats:
     """Return the pose (3,), or poses (n, 3), that heads the other way."""
     return np.concatenate([pose[..., :2], wrap(pose[..., 2:] + np.pi)], axis=-1)
 
 
-def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connection]:
+def connect_frontier(judge: PathJudge, nodes: Nodes, start: Pose, goal: Pose) -> list[Connection]:
     """Return the nodes nearest to a goal on which the rover can stand, as ends of a path.
 
     They lie at least a quarter of the wheelbase apart. What is left to the goal has a price.
@@ -178,12 +180,13 @@ def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connect
     by_distance = everywhere[np.argsort(away, kind="stable")]
     found: list[Connection] = []
     chosen: list[np.ndarray] = []
-    apart, places = 0.25 * judge.rover.wheelbase, max(1, FRONTIER_BATCH // HEADINGS)
+    apart, places = 0.25 * judge.site.rover.wheelbase, max(1, FRONTIER_BATCH // HEADINGS)
     for first in range(0, len(by_distance), places):
         some = by_distance[first : first + places]
         asked = (some[:, None] + np.arange(HEADINGS)).ravel()
         poses = nodes.poses(asked)
         stands = np.array([code == "" for code in judge.stand(poses)])
+        stands &= ~judge.site.marked.refuses_ends(start, poses)
         for node, pose in zip(asked[stands], poses[stands], strict=True):
             near = min((np.hypot(*(pose - other)[:2]) for other in chosen), default=np.inf)
             if 1e-9 < near < apart:
@@ -192,7 +195,7 @@ def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connect
                 if len(chosen) == FRONTIER_PLACES:
                     return found
                 chosen.append(pose)
-            price = FRONTIER_PRICE * float(np.hypot(*(pose - goal)[:2]))
+            price = MISSED_PRICE * float(np.hypot(*(pose - goal)[:2]))
             make = partial(np.asarray, pose[None, :])
             found.append(Connection(int(node), Gear.FORWARD, 0.0, make, price))
     return found

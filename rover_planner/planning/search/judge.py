@@ -12,11 +12,11 @@ the time at the limits: each moment counts by the square of ((used share of the 
 limit) - 1/2) x 2, which is 0 up to half of a limit and 1 at it.
 """
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -34,19 +34,19 @@ from rover_physics.traversability.judge import judge_poses
 from rover_physics.traversability.pieces import PieceVerdict, find_exposure, judge_pieces
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
-from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
+from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_geometry import rings_within
 from rover_planner.planning.path_query import (
     Candidate,
     PathAnswer,
-    PathQueryOptions,
     Pose,
     answer_path_query,
     check_path,
     choose_by_chance,
 )
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
-from rover_planner.planning.search.unobserved_check import UnobservedCheck, physical
+from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.unobserved_check import physical
 
 CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""
@@ -73,23 +73,15 @@ class JudgedPiece(NamedTuple):
 
 @dataclass
 class PathJudge:
-    """The model of one rover on one map with options."""
+    """The model of a rover on a map."""
 
-    rover: Rover
-    """The rover."""
-    terrain: Terrain
-    """The ground, map frame."""
-    options: PathQueryOptions
-    """Options of candidates and of the judgement of paths."""
-    unobserved_check: UnobservedCheck | None = None
-    """Refuses ground under the belly that was never seen; None allows it."""
-    marked: MarkedPlaces = NONE_MARKED
-    """Places that are impassable."""
+    site: Site
+    """Rover, map and options."""
     known: KnownPoses | None = None
     """Results of the model along whole paths so far, None if that is not kept."""
     known_in_pieces: KnownPoses | None = None
     """The same along pieces, with the friction and torque limit for which they are judged."""
-    poses: int = field(default=0, init=False)
+    asked_poses: int = field(default=0, init=False)
     """Number of poses that searches have asked for so far, a measure of the work done."""
 
     def search(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> PathAnswer:
@@ -110,7 +102,8 @@ class PathJudge:
         """
         answer, end, tried = self._query(start, goal), goal, 0
         if not answer.traversable and self._fails_at(answer, goal, tolerance):
-            for alternative in self._goals_to_stand_on(start, goal, tolerance):
+            rings = self.goals_near(start, goal, tolerance)
+            for alternative in (one for ring in rings for one in islice(ring, _QUERIES_PER_RING)):
                 tried += 1
                 other = self._query(start, alternative)
                 if other.traversable:
@@ -120,27 +113,17 @@ class PathJudge:
         return replace(answer, goal=end, goal_offset=offset, alternatives_tried=tried)
 
     def _query(self, start: Pose, goal: Pose) -> PathAnswer:
-        return self._hold(answer_path_query(self.rover, self.terrain, start, goal, self.options))
-
-    def _hold(self, answer: PathAnswer) -> PathAnswer:
-        """Return an answer whose choice is among the candidates whose ground is not refused.
+        """Return the answer whose choice is among the candidates whose ground is not refused.
 
         If all that are traversable are refused, the best of them is explained.
         """
+        site = self.site
+        answer = answer_path_query(site.rover, site.terrain, start, goal, site.options)
         if not answer.traversable:
             return answer
-        held = choose_by_chance(
-            self.rover,
-            self.terrain,
-            [self._hold_path(candidate) for candidate in answer.candidates],
-            self.options,
-        )
-        return held if held.traversable else replace(held, nearest=answer.nearest)
-
-    def _hold_path(self, candidate: Candidate) -> Candidate:
-        """Return a path, refused where its ground was never seen or is marked."""
-        check = self.unobserved_check
-        return self.marked.hold(candidate if check is None else check.hold(candidate))
+        paths = [site.hold(candidate) for candidate in answer.candidates]
+        held = choose_by_chance(site.rover, site.terrain, paths, site.options)
+        return held if held.traversable else replace(held, choice=answer.choice)
 
     def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
         """Return whether another goal within `tolerance` [m] may help.
@@ -148,7 +131,7 @@ class PathJudge:
         It may if some path fails where the ground under the rover is also ground under a rover
         at an allowed goal. Other paths fail before, where paths to the other goals lead too.
         """
-        near = tolerance + self.rover.wheelbase
+        near = tolerance + self.site.rover.wheelbase
         failures = [
             one.poses[one.verdict.first_failure] - goal
             for one in answer.candidates
@@ -156,16 +139,16 @@ class PathJudge:
         ]
         return any(np.hypot(*failure[:2]) <= near for failure in failures)
 
-    def _goals_to_stand_on(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Pose]:
-        """Yield alternative goals where the rover can stand, nearest first, a few per ring.
+    def goals_near(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Iterator[Pose]]:
+        """Yield rings of alternative goals where the rover can stand, from near to far.
 
         Goals on the start's side of a ring come first. If these cannot be reached, those behind
-        them rarely can, and each goal costs the evaluation of all candidates.
+        them rarely can.
         """
-        for ring in rings_within(start, goal, tolerance, self.rover.wheel.radius):
-            judged = ((pose, self._judge_path(pose[None, :])) for pose in ring)
-            standing = (pose for pose, one in judged if one.verdict.traversable)
-            yield from itertools.islice(standing, _QUERIES_PER_RING)
+        for ring in rings_within(start, goal, tolerance, self.site.rover.wheel.radius):
+            reached = np.array(ring)[~self.site.marked.refuses_ends(start, np.array(ring))]
+            judged = ((pose, self.site.hold(self._judge_path(pose[None, :]))) for pose in reached)
+            yield (pose for pose, one in judged if one.verdict.traversable)
 
     def check(self, poses: NDArray[np.float64], *, stop_at_failure: bool = False) -> Candidate:
         """Judge one given path of poses (n, 3), if wanted only up to its first failure.
@@ -173,29 +156,33 @@ class PathJudge:
         Raises:
             RoverError: The model refuses an option or the poses.
         """
-        self.poses += len(poses)
-        return self._hold_path(self._judge_path(poses, stop_at_failure=stop_at_failure))
+        self.asked_poses += len(poses)
+        return self.site.hold(self._judge_path(poses, stop_at_failure=stop_at_failure))
 
-    def _judge_path(self, poses: Pose, *, stop_at_failure: bool = False) -> Candidate:
+    def _judge_path(
+        self, poses: NDArray[np.float64], *, stop_at_failure: bool = False
+    ) -> Candidate:
+        site = self.site
         return check_path(
-            self.rover,
-            self.terrain,
+            site.rover,
+            site.terrain,
             poses,
-            self.options,
+            site.options,
             stop_at_failure=stop_at_failure,
             known=self.known,
         )
 
     def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
         """Return the class of each waypoint of a judged path; may evaluate the path once more."""
+        site = self.site
         judged = physical(candidate)
         return classify_judged(
-            self.rover,
-            self.terrain,
+            site.rover,
+            site.terrain,
             judged.prediction,
             judged.verdict,
-            self.options.model,
-            sigmas=self.options.map_sigmas,
+            site.options.model,
+            sigmas=site.options.map_sigmas,
         )
 
     @cached_property
@@ -205,19 +192,18 @@ class PathJudge:
         With the friction and the torque limit below which they are with the accepted chance,
         pieces need no samples; the whole path gets them.
         """
-        accepted, model, told = self.options.accepted_chance, self.options.model, self.rover
+        terrain, options, told = self.site.terrain, self.site.options, self.site.rover
+        accepted, model = options.accepted_chance, options.model
         if accepted >= 1.0:
-            return self.terrain, model
+            return terrain, model
         low = min(NormalDist().inv_cdf(max(accepted, LEAST_CHANCE)), 0.0)
         off = told.uncertainty
         friction, torque = (
             max(1.0 + low * math.hypot(std, off.model), LEAST_SHARE)
             for std in (off.friction, off.max_torque)
         )
-        layer = self.terrain.friction
-        ground = (
-            self.terrain if layer is None else replace(self.terrain, friction=friction * layer)
-        )
+        layer = terrain.friction
+        ground = terrain if layer is None else replace(terrain, friction=friction * layer)
         return ground, replace(
             model,
             friction=friction * (told.friction if model.friction is None else model.friction),
@@ -227,19 +213,20 @@ class PathJudge:
 
     def judge_pieces(self, pieces: Sequence[Piece]) -> list[JudgedPiece]:
         """Judge pieces of path; whether a path ends in a pit is asked of whole paths only."""
+        site = self.site
         poses = [piece.poses for piece in pieces]
-        self.poses += sum(map(len, poses))
-        (terrain, model), sigmas = self._cautious, self.options.map_sigmas
+        self.asked_poses += sum(map(len, poses))
+        (terrain, model), sigmas = self._cautious, site.options.map_sigmas
         found = judge_pieces(
-            self.rover, terrain, poses, model, sigmas=sigmas, known=self.known_in_pieces
+            site.rover, terrain, poses, model, sigmas=sigmas, known=self.known_in_pieces
         )
         judged = [
-            JudgedPiece(verdict.code, find_cost(self.rover, piece.gear, verdict))
+            JudgedPiece(verdict.code, find_cost(site.rover, piece.gear, verdict))
             for piece, verdict in zip(pieces, found, strict=True)
         ]
         for row in self._find_unobserved(poses, [one.code for one in judged]):
             judged[row] = JudgedPiece(UNOBSERVED_CODE, math.inf)
-        for row in np.flatnonzero(self.marked.refuses(poses)).tolist():
+        for row in np.flatnonzero(site.marked.refuses(poses)).tolist():
             judged[row] = JudgedPiece(MARKED_CODE, math.inf)
         return judged
 
@@ -248,13 +235,14 @@ class PathJudge:
 
         A rover that slips ahead up a slope of sand stands there if it can back out.
         """
-        if self.terrain.elevation_std is None or not self.options.map_sigmas:
-            self.poses += len(poses)
-            model = pack_model(self.rover, self.terrain, self.options.model)
+        site = self.site
+        if site.terrain.elevation_std is None or not site.options.map_sigmas:
+            self.asked_poses += len(poses)
+            model = pack_model(site.rover, site.terrain, site.options.model)
             codes = find_codes(model.limits, model.evaluate(poses))
         else:
             codes = list(self._judge_standing(poses).codes)
-        if self.terrain.soil is not None or self.options.model.soil is not None:
+        if site.terrain.soil is not None or site.options.model.soil is not None:
             refused = np.flatnonzero([code != "" for code in codes])
             for row in refused[self._stand_otherwise(poses[refused], BACK)].tolist():
                 codes[row] = ""
@@ -262,15 +250,17 @@ class PathJudge:
             codes[row] = UNOBSERVED_CODE
         return tuple(codes)
 
-    def refuse(self, pose: Pose) -> tuple[str, str]:
-        """Return code and reason why the rover cannot stand at a pose, empty if it can."""
+    def refuse(self, start: Pose, pose: Pose) -> tuple[str, str]:
+        """Return code and reason why a path from a start cannot end at a pose, empty if it can."""
+        site = self.site
         verdict = self._judge_standing(pose[None, :])
         code, reason = verdict.codes[0], verdict.reasons[0]
         if code and self._stand_otherwise(pose[None, :], *OTHER_MOTIONS)[0]:
             code, reason = "", ""
-        if self.unobserved_check is not None and self._find_unobserved([pose[None, :]], [code]):
-            return UNOBSERVED_CODE, self.unobserved_check.describe()
-        return code, reason
+        if self._find_unobserved([pose[None, :]], [code]):
+            return UNOBSERVED_CODE, site.unobserved_check.describe()
+        entered = None if code else site.marked.find(np.stack([start, pose]))
+        return (code, reason) if entered is None else (MARKED_CODE, entered[1].describe())
 
     def _stand_otherwise(
         self, poses: NDArray[np.float64], *motions: tuple[float, bool]
@@ -288,27 +278,30 @@ class PathJudge:
         self, poses: NDArray[np.float64], curvature: float = 0.0, backward: bool = False
     ) -> Verdict:
         """Judge single poses (n, 3), by default wheels ahead."""
-        self.poses += len(poses)
-        bends, sigmas = np.full(len(poses), curvature), self.options.map_sigmas
-        model = replace(self.options.model, backward=backward)
-        return judge_poses(self.rover, self.terrain, poses, bends, model, sigmas=sigmas)[1]
+        site = self.site
+        self.asked_poses += len(poses)
+        bends, sigmas = np.full(len(poses), curvature), site.options.map_sigmas
+        model = replace(site.options.model, backward=backward)
+        return judge_poses(site.rover, site.terrain, poses, bends, model, sigmas=sigmas)[1]
 
     def _find_unobserved(
         self, pieces: Sequence[NDArray[np.float64]] | NDArray[np.float64], codes: Sequence[str]
     ) -> list[int]:
         """Return the indices of pieces that pass by their codes, but are over unseen ground."""
+        site = self.site
         passing = [row for row, code in enumerate(codes) if not code]
-        if self.unobserved_check is None or not passing:
-            return []
-        refused = self.unobserved_check.refuses([pieces[row] for row in passing])
+        refused = site.unobserved_check.refuses(site.rover, [pieces[row] for row in passing])
         return [passing[row] for row in np.flatnonzero(refused).tolist()]
 
 
-def cost_of_path(rover: Rover, gear: Gear, path: Candidate) -> float:
-    """Return the cost [m] of a path that passes and is one piece."""
-    time, energy = float(path.prediction.time[-1]), float(path.prediction.energy[-1])
-    exposure = find_exposure(rover, path.prediction)
-    return find_cost(rover, gear, PieceVerdict("", time, energy, exposure))
+def cost_of_path(rover: Rover, pieces: Sequence[Piece], path: Candidate) -> float:
+    """Return the cost [m] of a path of pieces that passes."""
+    prices = np.repeat(
+        [PRICES[one.gear] for one in pieces], [len(one.poses) - 1 for one in pieces]
+    )
+    time, energy = prices @ np.diff(path.prediction.time), float(path.prediction.energy[-1])
+    priced = PieceVerdict("", float(time), energy, find_exposure(rover, path.prediction))
+    return find_cost(rover, Gear.FORWARD, priced) + sum(one.surcharge for one in pieces)
 
 
 def find_cost(rover: Rover, gear: Gear, piece: PieceVerdict) -> float:

@@ -51,7 +51,7 @@ class SearchProgress:
     """The best path that passes as a whole."""
     cost: float = np.inf
     """Its cost [m]."""
-    bound: float = 0.0
+    least_cost: float = 0.0
     """Bound from below on the cost of any path of the lattice [m]."""
     exhausted: bool = False
     """True if the lattice has no path left to look at."""
@@ -161,10 +161,10 @@ class LatticeSearch:
         starts, goals = (ends.seeds for ends in self.ends)
         route, progress = self.shortest.find(starts, goals, caution), self.progress
         if route is None:
-            progress.exhausted, progress.bound = True, progress.cost
+            progress.exhausted, progress.least_cost = True, progress.cost
             return True
         if caution == 0.0:
-            progress.bound = max(progress.bound, min(route.cost, progress.cost))
+            progress.least_cost = max(progress.least_cost, min(route.cost, progress.cost))
         if route.cost * (1.0 + NEAR_OPTIMAL) >= progress.cost:
             return True
         if not (self._stand_along(route) and self._judge_route(route)):

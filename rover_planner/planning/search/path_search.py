@@ -3,23 +3,26 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import check_pose, generate_candidates, path_length
 from rover_planner.planning.dubins import shortest_dubins_path
-from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.path_query import Candidate, Pose
 from rover_planner.planning.search.closed_area import ClosedArea, find_closed_area
 from rover_planner.planning.search.connections import (
-    FRONTIER_PRICE,
+    MISSED_PRICE,
+    Connection,
     connect_end,
     connect_frontier,
 )
@@ -71,9 +74,9 @@ class SearchResult:
     """One sentence for people."""
     path: Candidate | None
     """The path with prediction and verdict; None unless it was found."""
-    cost: float
-    """Its cost [m of level ground]; infinite without a path."""
-    bound: float
+    pieces: Sequence[Piece]
+    """Its pieces; empty without a path."""
+    suboptimality: float
     """Largest factor by which it cost more, before smoothing, than the best path of the lattice;
     infinite if that is not known."""
     expanded: int
@@ -94,6 +97,11 @@ class SearchResult:
     """The closed-in area where no path exists; else None."""
     warning: str
     """Condition that may have hidden a path, such as a coarse lattice; empty without one."""
+
+    @property
+    def cost(self) -> float:
+        """Its cost [m of level ground]; infinite without a path."""
+        return math.inf if self.path is None else sum(one.cost for one in self.pieces)
 
     def report(self) -> dict[str, Any]:
         """Return the result as plain values for JSON; numbers that are not known are None.
@@ -118,7 +126,7 @@ class SearchResult:
                 "edges": self.edges,
                 "seconds_first": self.seconds_first,
                 "seconds": self.seconds,
-                "bound": self.bound,
+                "bound": self.suboptimality,
                 "repeatable": self.repeatable,
                 "warning": self.warning,
                 "closed_area": None if closed is None else closed.area,
@@ -165,17 +173,18 @@ def _weigh_chances(
     chance is that of its worst place and does not add up from edge to edge.
     """
     began, weight = time.perf_counter(), settings.chance_weight
-    accepted = min(query.options.accepted_chance, ASKED)
-    answers, totals = [], []
+    accepted = min(query.site.options.accepted_chance, ASKED)
+    answers, totals, told = [], [], None
     while True:
         settings = replace(settings, budget=0.5 * settings.budget)
-        asked = replace(query, options=query.options.change(accepted_chance=accepted))
-        answers.append(_PathFinder(asked, settings, memory, on_progress).answer())
-        path, memory = answers[-1].path, None
+        options = query.site.options.change(accepted_chance=accepted)
+        asked = replace(query.site, options=options)
+        finder = _PathFinder(replace(query, site=asked), settings, memory, on_progress, told)
+        answers.append(finder.answer())
+        path, memory, told = answers[-1].path, None, finder.progress
         if path is None:
             break
-        missed = FRONTIER_PRICE * float(np.hypot(*(path.poses[-1] - query.goal)[:2]))
-        cost = cost_of_path(query.rover, Gear.FORWARD, path) + missed
+        cost = cost_of_path(query.site.rover, answers[-1].pieces, path)
         accepted = 0.5 * path.verdict.failure_chance
         totals.append(cost + weight * path.verdict.failure_chance)
         if accepted == 0.0 or cost >= min(totals):
@@ -198,45 +207,48 @@ class _PathFinder:
         settings: LatticeSettings,
         memory: EdgeMemory | None,
         on_progress: Callable[[SearchProgress], None] | None,
+        told: SearchProgress | None = None,
     ):
+        """Prepare a search; until it finds a path, `told` of an earlier one is its progress."""
         self._began = time.perf_counter()
-        self._query, self._settings, self._on_progress = query, settings, on_progress
-        self._start = _check_end("start", query, may_be_off_map=False)
-        self._goal = _check_end("goal", query, may_be_off_map=settings.frontier)
+        self._query, self._settings = query, settings
+        self._on_progress, self._told = on_progress, told
+        self._site = query.site
+        self._start = _check_end("start", query.start, query.site.terrain)
+        ground = None if settings.frontier else query.site.terrain
+        self._goal = _check_end("goal", query.goal, ground)
         self._memory = memory or EdgeMemory()
-        self._judge = PathJudge(
-            query.rover,
-            query.terrain,
-            query.options,
-            query.unobserved_check,
-            query.marked,
-            *self._memory.recall_poses(query),
-        )
-        cell = settings.cell or 0.25 * query.rover.wheelbase
+        self._judge = PathJudge(query.site, *self._memory.recall_poses(query.site))
+        cell = settings.cell or 0.25 * query.site.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
-        self._radius = tightest_radius(query.rover)
-        self._repeatable, self._to_frontier = True, False
-        self._progress = SearchProgress()
+        self._radius = tightest_radius(query.site.rover)
+        self._repeatable = True
+        self._goals, self._to_goal, self._to_frontier = [self._goal], True, False
+        self.progress = SearchProgress()
 
     def answer(self) -> SearchResult:
         """Search the path."""
-        for name, outcome, pose in (
-            ("start", START_REFUSED, self._start),
-            ("goal", GOAL_REFUSED, self._goal),
-        ):
-            code, reason = self._judge.refuse(pose)
-            is_frontier = self._settings.frontier and outcome == GOAL_REFUSED
-            self._to_frontier = is_frontier and code in BEYOND
-            if code and not self._to_frontier:
+        code, reason = self._judge.refuse(self._start, self._start)
+        if code:
+            return self._make_result(
+                START_REFUSED, f"the rover cannot stand at the start: {reason}"
+            )
+        code, reason = self._judge.refuse(self._start, self._goal)
+        if code:
+            self._to_goal = False
+            self._to_frontier = self._settings.frontier and code in BEYOND
+            rings = self._judge.goals_near(self._start, self._goal, self._query.tolerance)
+            self._goals = [] if self._to_frontier else list(chain.from_iterable(rings))
+            if not (self._goals or self._to_frontier):
                 return self._make_result(
-                    outcome, f"the rover cannot stand at the {name}: {reason}"
+                    GOAL_REFUSED, f"the rover cannot stand at the goal: {reason}"
                 )
-        progress = self._progress
-        if not self._to_frontier:
+        progress = self.progress
+        if self._to_goal:
             self._try_known_paths()
         if self._settings.ends_at_first and progress.best is not None:
             self._memory.keep_path(self._query, progress.pieces)
-            return self._make_result(FOUND, "", path=(progress.best, progress.cost))
+            return self._make_result(FOUND, "", path=progress.best, pieces=progress.pieces)
         search = self._prepare()
         try:
             return self._run(search)
@@ -245,10 +257,11 @@ class _PathFinder:
 
     def _run(self, search: LatticeSearch) -> SearchResult:
         """Search the lattice."""
-        progress = search.run(self._allowed)
+        progress = search.run(self._tell_and_go_on)
         if progress.best is not None:
-            path = self._smooth(progress)
-            return self._make_result(FOUND, self._describe_rest(path[0]), search, path=path)
+            path, pieces = self._smooth(progress)
+            rest = self._describe_rest(path)
+            return self._make_result(FOUND, rest, search, path=path, pieces=pieces)
         where = self._describe_extent()
         if not progress.exhausted:
             budget = self._settings.budget
@@ -260,7 +273,7 @@ class _PathFinder:
 
     def _warn(self) -> str:
         """Return what is wrong with the lattice, in words."""
-        cell, coarse = self._nodes.cell, COARSE * self._query.rover.wheelbase
+        cell, coarse = self._nodes.cell, COARSE * self._site.rover.wheelbase
         if cell <= coarse:
             return ""
         return (
@@ -301,14 +314,14 @@ class _PathFinder:
             return False
         priced = self._price(pieces, path)
         cost = sum(one.cost for one in priced)
-        if cost < self._progress.cost:
-            self._progress.keep(priced, path)
+        if cost < self.progress.cost:
+            self.progress.keep(priced, path)
         return math.isfinite(cost)
 
     def _price(self, pieces: list[Piece], path: Candidate) -> list[Piece]:
         """Return the pieces of a path that passes with their costs."""
         if len(pieces) == 1:
-            cost = cost_of_path(self._query.rover, pieces[0].gear, path)
+            cost = cost_of_path(self._site.rover, pieces, path)
             return [replace(pieces[0], cost=cost)]
         new = [k for k, one in enumerate(pieces) if np.isnan(one.cost)]
         judged = self._judge.judge_pieces([pieces[k] for k in new])
@@ -320,14 +333,15 @@ class _PathFinder:
 
         There is none if start and goal are the same.
         """
-        rover, found = self._query.rover, []
+        rover = self._site.rover
+        found: list[Piece] = []
         swing = swing_radius(rover) if can_turn_on_the_spot(rover) else None
         for gear, turn in ((Gear.FORWARD, None), (Gear.ON_THE_SPOT, swing)):
             poses = generate_candidates(
                 self._start,
                 self._goal,
                 count=1,
-                waypoint_spacing=self._query.options.waypoint_spacing,
+                waypoint_spacing=self._site.options.waypoint_spacing,
                 min_radius=self._radius,
                 swing_radius=turn,
             )[0]
@@ -337,41 +351,52 @@ class _PathFinder:
 
     def _prepare(self) -> LatticeSearch:
         """Return the search, with the estimates of the ground and the connections of the ends."""
-        query, nodes = self._query, self._nodes
-        rover, spacing = query.rover, query.options.waypoint_spacing
-        edges = self._memory.recall(query, nodes)
-        climb = steepest_climb(rover, query.options.model.friction or rover.friction)
-        terrain = cut_out(query, nodes) if self._is_limited else query.terrain
+        site, nodes = self._site, self._nodes
+        rover, spacing = site.rover, site.options.waypoint_spacing
+        edges = self._memory.recall(site, nodes)
+        climb = steepest_climb(rover, site.options.model.friction or rover.friction)
+        terrain = cut_out(site, nodes) if self._is_limited else site.terrain
         ground = estimate_ground(rover, terrain, nodes)
         edges.standing[ground.groundless] = edges.state_of("unknown_ground")
         return LatticeSearch(
             self._judge,
             edges,
             connect_end(rover, nodes, self._start, spacing, is_goal=False),
-            connect_frontier(self._judge, nodes, self._goal)
-            if self._to_frontier
-            else connect_end(rover, nodes, self._goal, spacing, is_goal=True),
+            self._connect_goals(),
             ground.doubt,
             estimate_difficulty(rover, terrain, nodes, climb, edges.samples),
-            self._progress,
+            self.progress,
         )
 
-    def _allowed(self, search: LatticeSearch) -> bool:
-        """Return whether the search may go on; tell of its progress."""
+    def _connect_goals(self) -> list[Connection]:
+        """Return the connections of all goals; the way that is left from one has a price."""
+        if self._to_frontier:
+            return connect_frontier(self._judge, self._nodes, self._start, self._goal)
+        rover, spacing = self._site.rover, self._site.options.waypoint_spacing
+        found = []
+        for goal in self._goals:
+            missed = MISSED_PRICE * float(np.hypot(*(goal - self._goal)[:2]))
+            connections = connect_end(rover, self._nodes, goal, spacing, is_goal=True)
+            found += [replace(one, surcharge=missed) for one in connections]
+        return found
+
+    def _tell_and_go_on(self, search: LatticeSearch) -> bool:
+        """Tell of the progress of the search, and return whether it may go on."""
         if self._on_progress is not None:
-            self._on_progress(search.progress)
+            is_found = search.progress.best is not None
+            self._on_progress(search.progress if is_found else self._told or search.progress)
         if self._settings.ends_at_first and search.progress.best is not None:
             return False
         budget = self._settings.budget
-        work = self._judge.poses + search.shortest.expanded / EXPANSIONS_PER_POSE
+        work = self._judge.asked_poses + search.shortest.expanded / EXPANSIONS_PER_POSE
         if work > POSES_PER_SECOND * budget:
             return False
         in_time = time.perf_counter() - self._began < budget
         self._repeatable &= in_time
         return in_time
 
-    def _smooth(self, progress: SearchProgress) -> tuple[Candidate, float]:
-        """Return the smoothed path, or the path itself where that does not pass, and its cost."""
+    def _smooth(self, progress: SearchProgress) -> tuple[Candidate, list[Piece]]:
+        """Return the smoothed path, or the path itself where that does not pass; its pieces."""
         best, budget = progress.best, self._settings.budget
         assert best is not None
         spent = time.perf_counter() - self._began
@@ -381,27 +406,27 @@ class _PathFinder:
         smoothed = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
         if not smoothed.verdict.traversable:
             smoothed, pieces = best, progress.pieces
-        if not self._to_frontier:  # it ends before the goal
+        if self._to_goal:
             self._memory.keep_path(self._query, pieces)
-        return smoothed, sum(one.cost for one in pieces)
+        return smoothed, pieces
 
     def _make_result(
         self,
         outcome: str,
         reason: str,
         search: LatticeSearch | None = None,
-        path: tuple[Candidate | None, float] = (None, math.inf),
+        path: Candidate | None = None,
+        pieces: Sequence[Piece] = (),
         closed: ClosedArea | None = None,
     ) -> SearchResult:
-        progress = self._progress
-        known = progress.best is not None and progress.bound > 0.0
-        bound = progress.cost / progress.bound if known else math.inf
+        progress = self.progress
+        is_bounded = progress.best is not None and progress.least_cost > 0.0
         return SearchResult(
             outcome=outcome,
             reason=reason,
-            path=path[0],
-            cost=path[1],
-            bound=bound,
+            path=path,
+            pieces=pieces,
+            suboptimality=progress.cost / progress.least_cost if is_bounded else math.inf,
             expanded=0 if search is None else search.shortest.expanded,
             edges_judged=progress.judged,
             edges=0 if search is None else search.edges.count,
@@ -414,11 +439,11 @@ class _PathFinder:
         )
 
 
-def _check_end(name: str, query: SearchQuery, *, may_be_off_map: bool) -> NDArray[np.float64]:
-    """Return the start or the goal (3,), checked."""
-    pose = check_pose(name, getattr(query, name))
-    if not (may_be_off_map or query.terrain.contains(pose[0], pose[1])):
-        xmin, xmax, ymin, ymax = query.terrain.bounds
+def _check_end(name: str, end: ArrayLike, terrain: Terrain | None) -> Pose:
+    """Return the start or the goal (3,), checked; it must be on the terrain if there is one."""
+    pose = check_pose(name, end)
+    if terrain is not None and not terrain.contains(pose[0], pose[1]):
+        xmin, xmax, ymin, ymax = terrain.bounds
         raise PlanningError(
             f"{name} is at ({pose[0]:g}, {pose[1]:g}), off the map, which goes from x {xmin:g} to "
             f"{xmax:g} and y {ymin:g} to {ymax:g} m"
@@ -435,10 +460,10 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
         radius: Tightest radius of the rover [m].
         most_poses: Number of poses that the model may be asked about.
     """
-    allowed = judge.poses + most_poses
+    allowed = judge.asked_poses + most_poses
     for span in SPANS:
         first = 0
-        while first + span <= len(pieces) and judge.poses < allowed:
+        while first + span <= len(pieces) and judge.asked_poses < allowed:
             check_interruption()
             found = _find_shortcut(judge, pieces[first : first + span], radius)
             if found is not None:
@@ -452,8 +477,9 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
 def _find_shortcut(judge: PathJudge, old: list[Piece], radius: float) -> Piece | None:
     """Return one curve driven forwards that costs less than some pieces; None if none does."""
     start, end = old[0].poses[0], old[-1].poses[-1]
-    spacing = judge.options.waypoint_spacing
-    cost = sum(one.cost for one in old) * (1.0 - GAIN)
+    spacing = judge.site.options.waypoint_spacing
+    surcharge = sum(one.surcharge for one in old)
+    cost = (sum(one.cost for one in old) - surcharge) * (1.0 - GAIN)
     for scale in RADII:
         poses = shortest_dubins_path(start, end, scale * radius, spacing)
         if path_length(poses) >= cost:
@@ -461,5 +487,5 @@ def _find_shortcut(judge: PathJudge, old: list[Piece], radius: float) -> Piece |
         curve = Piece(poses, Gear.FORWARD)
         judged = judge.judge_pieces([curve])[0]
         if judged.cost < cost:
-            return replace(curve, cost=judged.cost)
+            return replace(curve, cost=judged.cost + surcharge, surcharge=surcharge)
     return None

@@ -50,6 +50,8 @@ class Piece:
     """Gear in which it is driven."""
     cost: float = np.nan
     """Its cost [m of level ground], NaN if it is not judged."""
+    surcharge: float = 0.0
+    """Part of the cost that is not of its drive [m]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,11 @@ from numpy.typing import ArrayLike
 
 from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
-from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
-from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
-from rover_planner.planning.search.unobserved_check import UnobservedCheck
+from rover_planner.planning.search.site import Site
 
 MAX_NODES = 1_500_000
 """Largest number of nodes of a window; each takes 80 bytes."""
@@ -26,23 +23,15 @@ MAX_NODES = 1_500_000
 class SearchQuery:
     """A query for a path between two poses."""
 
-    rover: Rover
-    """The rover."""
-    terrain: Terrain
-    """The ground, map frame."""
+    site: Site
+    """Rover, map and options of the judgement of paths."""
     start: ArrayLike
     """(3,) x, y [m] and yaw [rad] of the body origin, map frame."""
     goal: ArrayLike
     """(3,) as `start`."""
-    options: PathQueryOptions
-    """Options of the judgement of paths."""
-    unobserved_check: UnobservedCheck | None = None
-    """Refuses ground under the belly that was never seen; None allows it."""
-    marked: MarkedPlaces = NONE_MARKED
-    """Places that are impassable."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "options", self.options.fit(self.rover))
+    tolerance: float = 0.0
+    """Largest distance from the goal's position [m] at which the path may end if the rover cannot
+    stand at the goal; the heading stays."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +66,7 @@ def choose_window(query: SearchQuery, cell: float) -> tuple[Nodes, bool]:
 
     A window that must be limited is a square around start and goal.
     """
-    xmin, xmax, ymin, ymax = query.terrain.bounds
+    xmin, xmax, ymin, ymax = query.site.terrain.bounds
     nodes = nodes_within(cell, (xmin, ymin), (xmax, ymax))
     if nodes.count <= MAX_NODES:
         return nodes, False
@@ -88,13 +77,13 @@ def choose_window(query: SearchQuery, cell: float) -> tuple[Nodes, bool]:
     return nodes_within(cell, (low[0], low[1]), (high[0], high[1])), True
 
 
-def cut_out(query: SearchQuery, nodes: Nodes) -> Terrain:
-    """Return the part of the map that a rover at the nodes may touch.
+def cut_out(site: Site, nodes: Nodes) -> Terrain:
+    """Return the part of the map that the rover at the nodes may touch.
 
     The map itself comes back where no height in the part is known.
     """
-    wheel, terrain = query.rover.wheel, query.terrain
-    margin = swing_radius(query.rover) + 2.0 * wheel.radius + terrain.resolution
+    wheel, terrain = site.rover.wheel, site.terrain
+    margin = swing_radius(site.rover) + 2.0 * wheel.radius + terrain.resolution
     ends = nodes.cell * np.array([nodes.first, np.add(nodes.first, nodes.shape[::-1]) - 1])
     try:
         return cut_around(terrain, ends, margin)

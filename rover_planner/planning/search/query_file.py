@@ -17,6 +17,7 @@ from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 
 _ENTRY, _MOST = "way_question", 1_000_000
 
@@ -56,19 +57,20 @@ def write_query(path: Path, question: SearchQuery, settings: LatticeSettings) ->
     Raises:
         TerrainError: The file cannot be written.
     """
-    options = asdict(question.options)
+    site = question.site
+    options = asdict(site.options)
     options |= options.pop("model")
     text = json.dumps(
         {
-            "rover": asdict(question.rover),
+            "rover": asdict(site.rover),
             "start": np.asarray(question.start).tolist(),
             "goal": np.asarray(question.goal).tolist(),
             "options": {field.name: options[field.name] for field in fields(_Options)},
-            "joint_angles": question.options.model.arm_angles,
+            "joint_angles": site.options.model.arm_angles,
             "settings": asdict(settings),
         }
     )
-    save_terrain(path, question.terrain, **{_ENTRY: text})
+    save_terrain(path, site.terrain, **{_ENTRY: text})
 
 
 def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, LatticeSettings]:
@@ -91,13 +93,7 @@ def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, Lat
         raise PlanningError(f"{path} holds no question for a path: {error}") from None
     with errors_of(path):
         asked: _Content = read_as(_Content, content, "a question for a path")
-    question = SearchQuery(
-        rover=rover_from_dict(asked.rover, str(path)),
-        terrain=terrain,
-        start=asked.start,
-        goal=asked.goal,
-        options=PathQueryOptions().change(
-            **asdict(asked.options), joint_angles=asked.joint_angles
-        ),
-    )
+    rover = rover_from_dict(asked.rover, str(path))
+    options = PathQueryOptions().change(**asdict(asked.options), joint_angles=asked.joint_angles)
+    question = SearchQuery(Site(rover, terrain, options), asked.start, asked.goal)
     return question, asked.settings

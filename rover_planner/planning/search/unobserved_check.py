@@ -10,35 +10,34 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
 from rover_planner.maps.unobserved_ground import (
+    ALLOW,
+    REFUSE,
     UNOBSERVED_CODE,
     ObservedGround,
-    UnobservedShare,
 )
-from rover_planner.parameters.traverse_server import ALLOW, REFUSE
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_query import Candidate
 
 
 @dataclass(frozen=True, eq=False)
 class UnobservedCheck:
-    """Holds paths of one rover against what was seen of one map."""
+    """Holds paths against what was seen of one map."""
 
-    rover: Rover
-    """The rover."""
-    seen: ObservedGround
-    """The seen part of the map."""
-    rule: str
+    seen: ObservedGround | None = None
+    """The seen part of the map; None if it is not known, then the rule is ALLOW."""
+    rule: str = ALLOW
     """A value of the parameter blind_ground."""
 
-    def share(self, candidate: Candidate) -> UnobservedShare:
-        """Return how much of the ground under the belly was never seen along a path."""
-        return self.seen.share(self.rover, candidate.poses)
+    @property
+    def kinds(self) -> NDArray[np.uint8] | None:
+        """(ny, nx) what was seen of each cell; None if the rule does not ask."""
+        return None if self.seen is None or self.rule == ALLOW else self.seen.kinds
 
-    def hold(self, candidate: Candidate) -> Candidate:
+    def hold(self, rover: Rover, candidate: Candidate) -> Candidate:
         """Return a traversable path with a refusal where the rule refuses its ground."""
-        if self.rule == ALLOW or not candidate.verdict.traversable:
+        if self.seen is None or self.rule == ALLOW or not candidate.verdict.traversable:
             return candidate
-        share = self.share(candidate)
+        share = self.seen.share(rover, candidate.poses)
         first = share.first_refused(self.rule)
         if first < 0:
             return candidate
@@ -49,16 +48,15 @@ class UnobservedCheck:
         )
         return candidate.refuse_at(first, UNOBSERVED_CODE, reason)
 
-    def refuses(self, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    def refuses(self, rover: Rover, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
         """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).
 
         Each pose counts. `hold` looks at a path where the belly has moved on by a cell, so a path
         of pieces that are not refused passes there.
         """
-        refused = np.zeros(len(pieces), bool)
-        if self.rule == ALLOW or not pieces:
-            return refused
-        below = self.seen.refused_below(self.rover, np.concatenate(pieces), self.rule)
+        if self.seen is None or not pieces:
+            return np.zeros(len(pieces), bool)
+        below = self.seen.refused_below(rover, np.concatenate(pieces), self.rule)
         firsts = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
         return np.logical_or.reduceat(below, firsts)
 
@@ -68,6 +66,10 @@ class UnobservedCheck:
 
     def _name_rule(self) -> str:
         return f"(blind_ground is {self.rule})"
+
+
+NONE_REFUSED = UnobservedCheck()
+"""Allows all ground."""
 
 
 def physical(candidate: Candidate) -> Candidate:

@@ -2,7 +2,7 @@
 """Feeds recorded messages to the service behind a traverse server, and collects its answers."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
-from rover_planner.planning.answering.questions import Register
+from rover_planner.planning.answering.questions import PathQuestion, Register
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.bags.bag_files import IMU, JOINTS, MAP, ODOMETRY, PATH, TF_STATIC, Recorded
@@ -96,8 +96,7 @@ class Replay:
         elif kind == ODOMETRY:
             yield from self._take_odometry(recorded)
         elif kind == PATH:
-            self._service.given_path = inputs.read_path(message)
-            yield self._ask(CHECKED, recorded.stamp, Snapshot.check_path)
+            yield self._ask(CHECKED, recorded.stamp, inputs.read_path(message))
         elif kind == JOINTS:
             inputs.take_joints(message)
         elif kind == IMU:
@@ -119,7 +118,7 @@ class Replay:
         if start is None:
             self.without_start += 1
             return
-        yield self._ask(PLANNED, recorded.stamp, lambda now: now.answer(start, end))
+        yield self._ask(PLANNED, recorded.stamp, PathQuestion(start, end))
 
     def _take_odometry(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         self.inputs.take_odometry(recorded.message)
@@ -139,9 +138,8 @@ class Replay:
     def _judge_drive(self) -> ReplayAnswer:
         """Judge the drive on the map that was known when it began; begin the next stretch."""
         drive, self._drive = self._drive, self._drive.rest()
-        path = self._service.given_path = GivenPath(np.array(drive.poses), "")
-        begun = replace(self._begun, path=path, measured_pose=None)
-        answer = self._ask(DRIVEN, drive.stamps[0], Snapshot.check_path, begun)
+        begun = replace(self._begun, measured_pose=None)
+        answer = self._ask(DRIVEN, drive.stamps[0], GivenPath(np.array(drive.poses), ""), begun)
         candidate = answer.judgement.candidate
         if candidate is None:
             return answer
@@ -151,15 +149,14 @@ class Replay:
         self,
         kind: str,
         stamp: int,
-        ask: Callable[[Snapshot], PathJudgement],
+        question: PathQuestion | GivenPath,
         snapshot: Snapshot | None = None,
     ) -> ReplayAnswer:
         """Ask a question; an invalid one is refused with its reason."""
         now = self._service.snapshot(stamp) if snapshot is None else snapshot
         try:
-            judgement = ask(now).complete()
+            judgement = question.judge(now)
         except RoverError as error:
             judgement = refusal("bad_request", str(error))
-        identity = self._register.identify(kind, "", now)
-        identity = replace(identity, path_hash=now.path.hash, path_stamp=now.path.stamp)
+        identity = self._register.identify(kind, question, now)
         return ReplayAnswer(kind, stamp, judgement, identity, now.terrain)

@@ -17,6 +17,7 @@ from rover_planner.planning.path_query import check_path, choose, generate_paths
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import SearchResult, find_path
 from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.search.site import Site
 from rover_planner.viewer.state.background_work import WorkStep
 from rover_planner.viewer.state.scenario import JudgedPath, Scenario, Shown
 
@@ -106,7 +107,7 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
     for k, poses in enumerate(paths):
         yield WorkStep(PATH, k + 1, len(paths))
         judged.append(_judge(asked, poses))
-    chosen = choose(tuple(judged)).nearest
+    chosen = choose(tuple(judged)).choice
     verdict = judged[chosen].verdict
     policies = {verdict.policy: verdict}
     return Shown(asked, tuple(judged), chosen, len(judged), by_policy=policies)
@@ -176,7 +177,8 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
     """
     yield WorkStep(SEARCH)
     asked = shown.scenario
-    question = SearchQuery(asked.rover, asked.terrain, asked.start, asked.goal, asked.options)
+    site = Site(asked.rover, asked.terrain, asked.options)
+    question = SearchQuery(site, asked.start, asked.goal)
     first = find_path(question, replace(asked.search, ends_at_first=True), memory)
     yield _add_path(shown, first)
     left = asked.search.budget - first.seconds

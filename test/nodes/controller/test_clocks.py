@@ -2,11 +2,14 @@
 """No clock and no hanging thread keeps the wheels turning with their last torque."""
 
 import time
+from unittest.mock import Mock
 
+import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
+from rover_planner.nodes.traction.topics import TractionTopics
 from support.waiting import wait_until
 
 BOUND = 1.5
@@ -68,3 +71,16 @@ def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, 
     wait_until(lambda: rover.state == "driving", "driving again")
     wait_until(lambda: rover.count_lines("updates came too late"), "the reason in the log")
     wait_until(lambda: int(rover.values["watchdog_trips"]), "the trip in the diagnostics")
+
+
+def test_a_state_that_the_watchdog_tells_late_does_not_stay():
+    topics, told = TractionTopics(Mock(), np.arange(6), np.ones(6)), []
+    topics.state = Mock(publish=lambda message: told.append(message.data))
+
+    def drive():
+        topics.write(np.ones(6), False, "driving")
+
+    topics.brake = Mock(publish=lambda message: message.data and drive())
+    topics.write(np.zeros(6), True, "fault")
+    drive()
+    assert told == ["driving", "fault", "driving"]

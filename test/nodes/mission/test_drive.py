@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from rover_planner.nodes.mission import drive
-from rover_planner.nodes.mission.drive import Drive, DriveFailedError, DriveSettings
+from rover_planner.nodes.mission.drive import Drive, DriveSettings
+from rover_planner.nodes.mission.errors import DriveFailedError
+from rover_planner.nodes.mission.server_client import Answer
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.simulator.path_follower import PathFollower
@@ -35,7 +37,7 @@ class SimulatedRover:
         self.asked.append(np.array(start))
         answer = answer_path_query(LSR1, MAP, start, goal, COARSE)
         poses = answer.chosen.poses if answer.traversable else []
-        return {"traversable": answer.traversable, "reason": answer.explain(), "poses": poses}
+        return Answer(answer.traversable, True, "", answer.explain(), poses, {})
 
     def send_path(self, poses):
         self.follower = self.make_follower(poses, 0.3)
@@ -43,7 +45,7 @@ class SimulatedRover:
     def check(self, poses):
         candidate = check_path(LSR1, MAP, poses, COARSE)
         held = self.marked.hold(candidate).verdict
-        return held.code, held.reason
+        return Answer(held.traversable, True, held.code, held.reason, poses, {})
 
     def has_ended(self):
         return self.follower.has_arrived(self.plant.pose()) if self.speaks else None
@@ -72,7 +74,7 @@ def make_rover(monkeypatch):
 def test_a_rover_before_a_place_that_is_marked_goes_back_before_it_asks_again(make_rover):
     rover = make_rover(MAP)
     goal, told = (1.5, 0.0, 0.0), []
-    plan = rover.ask(rover.plant.pose(), goal)["poses"]
+    plan = rover.ask(rover.plant.pose(), goal).poses
 
     def ask_freed(start, goal, ask=rover.ask):
         rover.marked = NONE_MARKED
@@ -80,7 +82,7 @@ def test_a_rover_before_a_place_that_is_marked_goes_back_before_it_asks_again(ma
 
     rover.ask = ask_freed
     rover.marked = MarkedPlaces((MarkedPlace(0.4, 0.0, 0.4, "stuck", "today"),))
-    Drive(rover, goal, SETTINGS, told.append).run(plan)
+    Drive(rover, rover, goal, SETTINGS, told.append).run(plan)
     assert "stuck" in told[0] and "back to" in told[1]
     assert rover.plant.pose()[0] == pytest.approx(1.5, abs=0.15)
 
@@ -88,10 +90,10 @@ def test_a_rover_before_a_place_that_is_marked_goes_back_before_it_asks_again(ma
 def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last(make_rover):
     rover = make_rover(make_terrain(lambda x, y: 0.9 * np.maximum(x, 0.0)))
     goal, told = (1.5, 0.0, 0.0), []
-    plan = rover.ask(rover.plant.pose(), goal)["poses"]
+    plan = rover.ask(rover.plant.pose(), goal).poses
     hindrance = "3 other paths led nowhere from .* stood for 0.3 s"
     with pytest.raises(DriveFailedError, match=hindrance):
-        Drive(rover, goal, SETTINGS, told.append).run(plan)
+        Drive(rover, rover, goal, SETTINGS, told.append).run(plan)
     first, again = rover.asked[1], rover.asked[2]
     assert first[0] - again[0] == pytest.approx(0.4, abs=0.15)  # back along the plan
     assert sum("has stood" in what for what in told) == 4
@@ -101,10 +103,10 @@ def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last(make
 def test_the_next_plan_begins_where_the_rover_has_come_to_rest(make_rover):
     rover = make_rover(MAP)
     half_way = (0.0, 0.0, 0.0)
-    plan = rover.ask(rover.plant.pose(), half_way)["poses"]
+    plan = rover.ask(rover.plant.pose(), half_way).poses
     resting = []
     tell = lambda what: resting.append(rover.plant.pose())  # noqa: E731
-    Drive(rover, (1.5, 0.0, 0.0), SETTINGS, tell).run(plan)
+    Drive(rover, rover, (1.5, 0.0, 0.0), SETTINGS, tell).run(plan)
     assert len(resting) == 1
     assert resting[0] == pytest.approx(rover.asked[1])
     assert rover.plant.pose()[0] == pytest.approx(1.5, abs=0.15)
@@ -116,7 +118,7 @@ def test_a_rover_that_ends_beside_the_goal_or_turned_away_has_not_arrived(make_r
     rover = make_rover(MAP)
     rover.speaks = speaks
     goal, told = (0.5, 0.0, 0.0), []
-    plan = rover.ask(rover.plant.pose(), goal)["poses"]
+    plan = rover.ask(rover.plant.pose(), goal).poses
 
     class Short(PathFollower):
         """Ends its first path too early, and turned."""
@@ -128,7 +130,7 @@ def test_a_rover_that_ends_beside_the_goal_or_turned_away_has_not_arrived(make_r
             return (0.0, 0.0) if self.has_arrived(pose) else super().steer(pose, speed)
 
     rover.make_follower = Short
-    end = Drive(rover, goal, SETTINGS, told.append).run(plan)
+    end = Drive(rover, rover, goal, SETTINGS, told.append).run(plan)
     assert any("has ended 0.1" in what or "has stood" in what for what in told), told
     assert rover.plant.pose() == pytest.approx(goal, abs=0.1)
     assert end == pytest.approx(rover.plant.pose())

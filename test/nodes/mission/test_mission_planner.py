@@ -16,8 +16,8 @@ from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
 from rover_planner.nodes import mission_planner
-from rover_planner.nodes.mission.drive import DriveFailedError
-from rover_planner.nodes.mission_planner import NoAnswerError, main
+from rover_planner.nodes.mission.errors import DriveFailedError, NoAnswerError
+from rover_planner.nodes.mission_planner import main
 from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
@@ -147,7 +147,7 @@ def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again
             mapped, lambda: mapped.desk.cancel(STOPPING, "the server is shutting down")
         )
     ask.join(20.0)
-    assert answers[0]["traversable"]
+    assert answers[0].traversable
 
 
 def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhere_ends_a_drive(
@@ -160,15 +160,15 @@ def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhe
         make_planner(timeout=2.0, cli_args=["--ros-args", "-r", f"__node:={name}"])
         for name in ("first", "second")
     )
-    first.send_path(np.zeros((1, 3)))
+    first.rover.send_path(np.zeros((1, 3)))
     with pytest.raises(NoAnswerError, match="the end of first, which sends the rover paths"):
-        second.send_path(np.zeros((1, 3)))
+        second.rover.send_path(np.zeros((1, 3)))
 
     def is_told() -> bool:
         odometry.publish(odometry_at((0.0, 0.0, 0.0)))
         rover.create_publisher(Path, "path", 10).publish(poses_path(np.ones((2, 3)), "map"))
         try:
-            first.wait_for_pose(lambda pose: True, 0.1)
+            first.rover.wait_for_pose(lambda pose: True, 0.1)
         except DriveFailedError as error:
             return "another node has sent the rover a path" in str(error)
         return False

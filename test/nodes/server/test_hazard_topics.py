@@ -103,6 +103,7 @@ def test_switched_off_no_cell_is_free_and_switched_on_none_of_what_was_judged_be
     for grids in (worst, first):
         wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
     assert ask_for_grid(client).info.width == 0
+    client.wait_for_log("get_hazard_map: an empty grid, the parameter hazard_map is false")
     client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
     assert client.set_parameter("hazard_map", True)[0]
     before = len(worst)

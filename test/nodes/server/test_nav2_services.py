@@ -32,12 +32,13 @@ def make_services(server):
 
 
 def ask(server, poses):
-    """Put a request to the handler of the service, as rclpy would."""
-    replies, services = [], make_services(server)
+    """Put a request to the handlers of the service, as the desk would."""
+    answers, services = [], make_services(server)
     request, response = SimpleNamespace(path=poses_path(poses, "map")), SimpleNamespace()
-    services.check(request, response, replies.append)
-    wait_until(lambda: replies, "the reply")
-    return replies[0]
+    server.desk.ask("is_path_valid", server.read_path(request.path), answers.append)
+    wait_until(lambda: answers, "the answer")
+    services.fill(request, response, answers[0])
+    return response
 
 
 def test_the_poses_of_a_path_that_are_not_passable_are_named(server):

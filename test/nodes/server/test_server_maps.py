@@ -11,7 +11,7 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics import Terrain, save_terrain
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_planner.maps.map_keeper import MapKeeper
+from rover_planner.planning.answering.map_keeper import MapKeeper
 from rover_planner.ros.qos import map_qos
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import SERVER, ask

@@ -3,6 +3,8 @@
 
 import json
 import math
+import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,9 @@ from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.traversability.classification import PASSABLE
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
+from rover_planner.planning.answering.budget import TOO_LONG
+from rover_planner.planning.answering.judgement import refusal
+from rover_planner.planning.answering.questions import PathQuestion
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, waves
 from support.messages import send_map_odom
@@ -99,9 +104,10 @@ def test_results_are_those_of_the_rover_of_the_question(shared):
     """Angles of a path of one rover had the wheel radius of the next one."""
     server = shared.server
     known = server.service.snapshot()
-    judged, about = known.answer(START, GOAL), server.desk.identify("can_traverse", "", known)
+    question = PathQuestion(START, GOAL)
+    about = server.desk.register.identify("can_traverse", question, known)
     assert shared.client.set_parameter("rover", "m2020") == (True, "")
-    results = run_in_executor(server, lambda: server.publish(judged, about))
+    results = run_in_executor(server, lambda: server.publish(question.judge(known), about))
     assert shared.client.set_parameter("rover", "lsr1") == (True, "")
     assert results.rover is known.settings.rover
 
@@ -118,3 +124,14 @@ def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, las
     assert answer.success and not verdict["suspension_agrees"]
     assert verdict["suspension_mismatch"]["rocker_left"] == pytest.approx(0.5, abs=0.05)
     assert results["verdict"].status[0].level == DiagnosticStatus.WARN
+
+
+def test_questions_without_a_pause_do_not_put_off_the_refusal_of_one_that_hangs(start_server):
+    server, go_on, codes = start_server(time_budget=0.2), threading.Event(), []
+    hangs = SimpleNamespace(hash="", judge=lambda _: refusal("", f"{go_on.wait(60.0)}"))
+
+    def ask_again():
+        server.desk.ask("check_path", hangs, lambda answer: codes.append(answer.judgement.code))
+
+    wait_until(lambda: server.handover.call(ask_again) or TOO_LONG in codes, "the refusal", 5.0)
+    go_on.set()

@@ -129,6 +129,13 @@ def test_no_rim_sinks_into_steep_cells_almost_as_large_as_the_wheel():
     assert gaps.min() >= -1e-4
 
 
+def test_no_rim_sinks_into_cells_twenty_times_as_large_as_the_wheel():
+    heights = [[-0.75, -1.22, -0.97], [-1.45, -1.37, -1.39], [-1.43, -2.79, -2.34]]
+    ground = Terrain(np.array(heights), 2.0, (-2.0, -2.0))
+    prediction = judge_poses(LSR1, ground, [[-0.13, 0.08, -1.24]])[0]
+    assert wheel_gaps(LSR1, ground, prediction, 0).min() >= -1e-4
+
+
 @both_sets
 def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
     for case, prediction, i in waypoints_of(predict()):

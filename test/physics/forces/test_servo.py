@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rover_physics import SweepOptions, judge_path, judge_poses
 from rover_physics.forces import soil as soil_model
 from rover_physics.forces.servo_balance import write_residual
-from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
+from rover_physics.forces.servo_motion import SERVO_STATE
 from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import S, T, roll_wheel
 from rover_physics.numerics.records import new_record
@@ -185,7 +185,7 @@ many = settings(max_examples=20)
 def servo_of(limit, droop, share=1.0):
     """Return the SERVO of one wheel that is commanded to roll at the nominal speed."""
     servo = new_record(
-        SERVO_RECORD, droop=droop, full_traction=FULL, max_traction=limit, creep=BAND,
+        SERVO_STATE, droop=droop, full_traction=FULL, max_traction=limit, creep=BAND,
         friction_share=share, radius=RADIUS, width=WIDTH, weight=WEIGHT,
     )  # fmt: skip
     servo.command[0] = 1.0

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rover_physics.forces.soil import (
-    MIN_FRICTION,
+    MIN_PULL,
     SHEAR_MODULUS,
     SoilWheel,
     contact_length,
@@ -84,7 +84,7 @@ def test_slip_to_pull_and_back_is_the_same_slip(name, wheel, N, slip):
     # Full slip of a long contact is the flat end of an exponential: digits of pull become slip.
     steepness = contact_length(r, result.sinkage) / soil[SHEAR_MODULUS]
     again = solve(soil, r, b, N, pull, 0.0)
-    if friction_of(soil, r, b, N) > MIN_FRICTION:
+    if friction_of(soil, r, b, N) > MIN_PULL:
         assert again.utilisation <= 1.0
     assert again.slip_ratio == pytest.approx(slip, abs=1e-10 * (1.0 + steepness))
 
@@ -93,7 +93,7 @@ def test_slip_to_pull_and_back_is_the_same_slip(name, wheel, N, slip):
 def test_forces_within_the_effective_friction_are_within_the_strength(name, wheel, N, t, s):
     soil = SOILS[name]
     friction = friction_of(soil, *wheel, N)
-    assume(friction > MIN_FRICTION)
+    assume(friction > MIN_PULL)
     T, S = t * friction * N, s * friction * N
     result = solve(soil, *wheel, N, T, S)
     circle = math.hypot(t, s)
@@ -113,10 +113,10 @@ def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged_unless_sunk_to_its
     soil = SOILS["mars_simulant"]
     sunk = solve(soil, 0.1, 0.08, 2000.0, 1.0, 0.0)
     assert sunk.sinkage > 0.1 and sunk.utilisation == np.inf
-    assert sunk.resistance > 0.0 and friction_of(soil, 0.1, 0.08, 2000.0) == MIN_FRICTION
+    assert sunk.resistance > 0.0 and friction_of(soil, 0.1, 0.08, 2000.0) == MIN_PULL
     wheel = (0.1, 0.08, 90.0)
     idle = solve(soil, *wheel, 0.0, 0.0)
-    assert idle.sinkage < 0.1 and friction_of(soil, *wheel) == MIN_FRICTION
+    assert idle.sinkage < 0.1 and friction_of(soil, *wheel) == MIN_PULL
     assert idle.utilisation == np.inf and idle.slip_ratio == 1.0
     dragged = solve(soil, *wheel, -idle.resistance, 0.0)
     assert dragged.utilisation == 0.0 and dragged.slip_ratio == 0.0
@@ -129,7 +129,7 @@ def test_a_lifted_wheel_has_no_grip(name, N):
     soil = pack_soils(default=name)[0]
     assert tuple(solve(soil, 0.1, 0.08, N, 2.0, 0.0)) == (1.0, 0.0, 0.0, 0.2, np.inf)
     if name is not None:
-        assert friction_of(soil, 0.1, 0.08, N) == MIN_FRICTION
+        assert friction_of(soil, 0.1, 0.08, N) == MIN_PULL
 
 
 @given(st.floats(0.1, 1000.0), st.floats(-1000.0, 1000.0), st.floats(-1000.0, 1000.0))

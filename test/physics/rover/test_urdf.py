@@ -123,6 +123,23 @@ def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
     assert masses.rocker.com == pytest.approx((0.0, 0.3 - 0.5 * 0.05 / 2.0, 0.0))
 
 
+def test_a_wheel_is_its_largest_cylinder(tmp_path):
+    hub = '<geometry><cylinder radius="0.03" length="0.2"/></geometry></collision><collision>'
+    text = foreign_urdf().replace("<collision>", f"<collision>{hub}")
+    assert read_foreign(tmp_path, text).rover == read_foreign(tmp_path).rover
+
+
+def test_what_rounding_leaves_of_a_bogie_without_mass_is_no_mass(tmp_path):
+    text = re.sub(r'("Bogie."><inertial><mass value=)"1.0"', r'\1"0"', foreign_urdf())
+    text = text.replace('mass value="0.5"', 'mass value="0.1"')
+    for wheel in ("BR", "MR", "FR", "BL", "ML", "FL"):
+        motor = f'<link name="A{wheel}"><inertial><mass value="0.7"/></inertial></link>'
+        motor += f'<joint name="A{wheel}" type="fixed"><parent link="Wheel{wheel}"/>'
+        text = text.replace("</robot>", f'{motor}<child link="A{wheel}"/></joint></robot>')
+    bogie = read_foreign(tmp_path, text).rover.masses.bogie
+    assert (bogie.mass, bogie.com) == (0.0, pytest.approx((0.2, 0.3, -0.05)))
+
+
 def test_angles_of_the_map_bring_the_rover_onto_flat_ground(tmp_path):
     straight = read_foreign(tmp_path).rover
     text = turned(turned(foreign_urdf(), "0.1 0.3 -0.5", 0.1), "0.1 -0.3 -0.5", 0.1)
@@ -190,6 +207,7 @@ def test_a_wrong_joint_map_is_refused_with_its_key(keys, said, tmp_path):
         ),
         ('xyz="0.1 0.3 -0.5"', 'xyz="0.1 0.3"', "PR: xyz is '0.1 0.3'; it must be 3 numbers"),
         ('mass value="10.0"', 'mass value="-1"', "link Body: mass is -1"),
+        ('mass value="10.0"', 'mass value="nan"', "Body: value is 'nan'; it must be a number"),
         ('xyz="0.1 0.3 -0.5"', 'xyz="1e300 0.3 -0.5"', "PR: xyz is '1e300 0.3 -0.5'"),
         ('type="floating"', 'type="hinge"', "joint Root: type is 'hinge'"),
         ('<child link="RockerL"/>', '<child link="RockerX"/>', "'RockerX' is no link"),

@@ -59,6 +59,7 @@ COULOMB = {"model": "coulomb", "source": "s"}
     [
         *[(data, "is .*; it must be a mapping of names to soils") for data in ({}, "dune")],
         ({7: COULOMB}, "soil name is 7; it must be a text"),
+        ({"slab": COULOMB | {"n": 1.0}}, r"unknown key slab\.n"),
         ({"slab": COULOMB | {"friction": 0.0}}, r"slab\.friction is 0\.0; it must be .*above 0"),
         ({"dune": DUNE | {"model": "mohr"}},
          "dune.model is 'mohr'; it must be coulomb or bekker_wong"),

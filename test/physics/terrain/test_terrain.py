@@ -2,6 +2,7 @@
 """The terrain: what is refused, the bilinear look-up, filled gaps, files, and how it is packed."""
 
 import gc
+import pickle
 import weakref
 from dataclasses import fields
 from pathlib import Path
@@ -248,3 +249,5 @@ def test_a_ground_outlives_its_terrain():
     _ = [np.full((40, 40), -1.0) for _ in range(50)]  # would take the place of what is freed
     assert height_inside(ground.records[0], 10.3, 20.7) == 0.25
     assert friction_at(ground.records[0], 1.0, 2.0, 0.9) == 0.6
+    with pytest.raises(TypeError, match="pickle its Terrain"):
+        pickle.dumps(ground)

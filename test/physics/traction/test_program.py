@@ -14,7 +14,7 @@ from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from support.best_torques import can_stand
 from support.rough_grounds import fractal, plane, random_poses
-from support.rover_geometry import place_rover
+from support.rover_geometry import balance_matrix, place_rover
 from support.rovers import LSR1, M2020
 from support.traction_states import state_of
 
@@ -107,7 +107,9 @@ def test_an_unsolved_program_falls_back_to_equal_torques_and_those_on_demand_are
     assert not wanted.fallback and np.ptp(wanted.torques) < 1e-12
 
 
-def test_contact_angles_without_equilibrium_are_refused():
+def test_contact_angles_without_equilibrium_and_ground_without_friction_are_refused():
+    with pytest.raises(ModelError, match="must all be above 0"):
+        solve(LSR1, level(), friction=np.zeros(6))
     with pytest.raises(ModelError, match="contact angles"):
         BalanceWriter(LSR1).write(level(np.full(6, np.pi / 2) * [1, 1, 1, -1, -1, -1]), 0.0)
 
@@ -132,6 +134,9 @@ def test_the_answer_is_within_3_percent_of_the_optimum_and_better_than_equal_tor
             state = state_of(LSR1, prediction, i)
             used, by_equal = (solve(LSR1, state, programs=count) for count in (12, 0))
             assert not used.fallback and used.load_slack == used.torque_slack == 0.0
+            A, b, _ = balance_matrix(LSR1, prediction, i, shared=False)
+            forces = np.concatenate([used.loads, used.tractions, used.lateral])
+            assert np.abs(A @ forces / LSR1.weight - b).max() < 1e-6
             most = used.utilisation.max()
             better.append(most / by_equal.utilisation.max())
             assert curvature or not can_stand(LSR1, prediction, i, most / 1.03, 2.0)

@@ -3,6 +3,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 from unittest.mock import Mock
 
 import numpy as np
@@ -20,29 +21,27 @@ from rover_planner.planning.answering.budget import (
     QuestionStoppedError,
 )
 from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
-from rover_planner.planning.answering.questions import Question
 from support.grounds import make_terrain, waves
 from support.waiting import wait_until
 
 
 class Desk:
-    """A queue whose judgements are collected as (name, judgement), with a clock of its own."""
+    """A queue of works by name, with a clock of its own; collects judgements, or codes."""
 
     def __init__(self):
         self.told: list[tuple[str, object]] = []
+        self.reasons: list[str] = []
+        self.works: dict[str, Callable[[Budget], object]] = {}
         self.max_waiting, self.now, self.begun = 100, 0.0, threading.Event()
-        self.queue = QuestionQueue(
-            lambda asked: asked.question.judge(asked.budget),
-            lambda _finish: None,
+        self.queue = QuestionQueue[Asked, object](
+            lambda asked: self.works[asked.service](asked.budget),
+            lambda: None,
             lambda place, error: f"{place}: {error!r}",
         )
 
-    def ask(self, name, work, seconds=1.0, refuse=lambda code, _: code) -> None:
-        def answer(judgement) -> None:
-            self.told.append((name, judgement))
-
-        budget = Budget(seconds, lambda: self.now)
-        self.queue.ask(Asked(Question(name, "", work, refuse), budget, answer), self.max_waiting)
+    def ask(self, name, work, seconds=1.0) -> None:
+        self.works[name] = work
+        self.queue.ask(Asked(name, Budget(seconds, lambda: self.now)), self.max_waiting)
 
     def work_on(self, budget: Budget) -> None:
         """Work until the budget ends it."""
@@ -53,7 +52,9 @@ class Desk:
 
     def wait(self, count: int) -> list[tuple[str, object]]:
         def enough() -> bool:
-            self.queue.finish()
+            for asked, found in self.queue.take_answers():
+                self.told.append((asked.service, getattr(found, "code", found)))
+                self.reasons.append(getattr(found, "reason", ""))
             return len(self.told) >= count
 
         wait_until(enough, f"{count} answers")
@@ -93,7 +94,7 @@ def test_beyond_the_queue_the_answer_is_busy_at_once_and_who_waits_gets_one(desk
     assert desk.begun.wait(20.0)
     desk.ask("waits", lambda _: 5, seconds=20.0)
     desk.ask("too many", lambda _: 6)
-    assert desk.told == [("too many", BUSY)]
+    assert desk.wait(1) == [("too many", BUSY)]
     desk.now = 2.0
     assert desk.wait(3)[1:] == [("works", TOO_LONG), ("waits", 5)]
 
@@ -105,9 +106,9 @@ def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_d
     desk.ask("waiting", desk.work_on)
     desk.now = 2.0
     desk.queue.refuse_overdue(10.0)
-    assert desk.told == [("waiting", BUSY)]  # it never began, and needs no grace
+    assert desk.wait(1) == [("waiting", BUSY)]  # it never began, and needs no grace
     desk.queue.refuse_overdue(0.5)
-    assert desk.told == [("waiting", BUSY), ("deaf", TOO_LONG)]
+    assert desk.wait(2) == [("waiting", BUSY), ("deaf", TOO_LONG)]
     go_on.set()
     desk.ask("next", lambda _: 5)
     assert desk.wait(3)[2:] == [("next", 5)] and desk.queue.open_count == 0
@@ -115,17 +116,16 @@ def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_d
 
 def test_errors_of_the_input_are_bad_requests_and_others_internal_errors(desk):
     for name, error in (("one", PoseError("no pose")), ("two", KeyError("k"))):
-        desk.ask(name, Mock(side_effect=error), refuse=lambda *both: both)
-    first, second = (told for _, told in desk.wait(2))
-    assert first == ("bad_request", "no pose")
-    assert second == ("internal_error", "internal error: two: KeyError('k')")
+        desk.ask(name, Mock(side_effect=error))
+    assert desk.wait(2) == [("one", "bad_request"), ("two", "internal_error")]
+    assert desk.reasons == ["no pose", "internal error: two: KeyError('k')"]
 
 
 def test_all_open_questions_can_be_cancelled(desk):
     desk.ask("one", desk.work_on)
     desk.ask("two", desk.work_on)
     assert desk.queue.stop_all(CANCELLED, "told so") == 2
-    assert desk.told == [("one", CANCELLED), ("two", CANCELLED)]
+    assert desk.wait(2) == [("one", CANCELLED), ("two", CANCELLED)]
     desk.ask("next", lambda _: 5)
     assert desk.wait(3)[2] == ("next", 5)
     desk.queue.close()

@@ -86,7 +86,7 @@ def test_a_learned_friction_changes_new_questions_only_if_it_is_to_be_used(
     service.take_ground(LearnedGround(0.4, 0.04, 0.33, is_bounded, "12.5"))
     assert friction_used(service) == pytest.approx(0.8 / assumed * told, rel=1e-6)
     assert before.settings.rover.friction == 0.8
-    report = asdict(Register().identify("check_path", "", service.snapshot()))
+    report = asdict(Register().identify("check_path", GivenPath(), service.snapshot()))
     assert report["ground"] == ("learned" if learn == "use" else "told")
     known = {"off": math.nan}.get(learn, 0.4)
     assert report["ground_friction"] == pytest.approx(known, nan_ok=True)
@@ -118,7 +118,8 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     assert service.snapshot().known_map is laid  # packed once
     service.renew_map(None)
     assert service.snapshot().terrain is laid.terrain
-    assert asdict(Register().identify("", "", service.snapshot()))["ground_classes"] == {"1": 0.4}
+    identity = Register().identify("check_path", GivenPath(), service.snapshot())
+    assert identity.ground_classes == {"1": 0.4}
     # On class 2 nothing slipped, and on class 3 no wheel was.
     for number, friction in {1: 0.4, 2: 0.8, 3: 0.8, np.nan: 0.5}.items():
         used = friction_used(learned_on(number))

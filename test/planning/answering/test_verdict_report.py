@@ -13,6 +13,7 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.answering.judgement import refusal
 from rover_planner.planning.answering.questions import Register
+from rover_planner.planning.answering.snapshot import GivenPath
 from support.grounds import make_terrain, wall_at
 from support.services import make_service
 
@@ -34,7 +35,7 @@ def full(service):
 
 
 def test_the_docs_have_the_keys_of_a_full_report_and_no_other(full, service):
-    identity = Register().identify("can_traverse", "ab", service.snapshot())
+    identity = Register().identify("can_traverse", GivenPath(), service.snapshot())
     report = replace(full.report, identity=identity)
     text = DOCS.read_text()
     keys = text[text.index("\n- `traversable`") :]

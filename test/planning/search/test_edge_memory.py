@@ -10,7 +10,7 @@ from rover_physics import Terrain
 from rover_planner.planning.path_query import PathQueryOptions, check_path
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.search.site import Site
 from support.grounds import make_terrain, waves
 from support.predictions import assert_same
 from support.rough_grounds import rocky
@@ -42,8 +42,8 @@ def change_at_random(before: Terrain, rng: np.random.Generator) -> Terrain:
 def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(ground, policy):
     options, memory, rng = OPTIONS.change(policy=policy), EdgeMemory(), np.random.default_rng(3)
     for _ in range(12):
-        query = SearchQuery(LSR1, ground, WAY[0], WAY[-1], options)
-        judge = PathJudge(LSR1, ground, options, None, query.marked, *memory.recall_poses(query))
+        site = Site(LSR1, ground, options)
+        judge = PathJudge(site, *memory.recall_poses(site))
         part, whole = judge.check(WAY), check_path(LSR1, ground, WAY, options)
         assert part.verdict == whole.verdict
         assert_same(part.prediction, whole.prediction)

@@ -2,14 +2,21 @@
 """Searches keep out of marked places until these are cleared, and off ground never seen."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rover_physics import Terrain, load_rover
 from rover_planner.errors import PlanningError
-from rover_planner.maps.unobserved_ground import ASSUMED, ObservedGround, observed_ground
-from rover_planner.parameters.traverse_server import ALLOW_FOOTPRINT, AUTO, REFUSE
+from rover_planner.maps.unobserved_ground import (
+    ALLOW_FOOTPRINT,
+    ASSUMED,
+    REFUSE,
+    ObservedGround,
+    observed_ground,
+)
+from rover_planner.parameters.traverse_server import AUTO, LATTICE
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import (
@@ -21,9 +28,12 @@ from rover_planner.planning.marked_places import (
 )
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
-from rover_planner.planning.search.path_search import START_REFUSED, find_path
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
+from support.grounds import make_terrain
 from support.paths import poses_at
 from support.rough_grounds import plane
 from support.services import make_service
@@ -67,6 +77,43 @@ def test_a_goal_in_a_marked_place_is_answered_with_one_near_it(service):
     assert np.hypot(end[0] - 1.0, end[1]) == pytest.approx(near.search.goal_offset)
 
 
+def test_a_search_is_told_at_once_that_its_goal_is_in_a_marked_place():
+    """It looked at all edges around it, and told that there is no way."""
+    service = make_service(plane(0.0, 0.0, half=2.5), planner=LATTICE)
+    service.mark(PLACE)
+    judged = service.snapshot().answer(START, (PLACE.x, PLACE.y, 0.0))
+    assert judged.code == GOAL_REFUSED and PLACE.reason in judged.reason
+
+
+def test_a_search_to_the_frontier_ends_outside_a_marked_place():
+    """All that was offered lay in the place, and there was no way."""
+    unseen = make_terrain(lambda x, y: np.where(x > 0.5, np.nan, 0.0 * x), half=2.5)
+    service = make_service(
+        unseen, planner=LATTICE, search_frontier=True, lattice_cell=0.25, search_budget=60.0
+    )
+    service.mark(replace(PLACE, x=0.2, radius=1.5))
+    judged = service.snapshot().answer((-1.8, 0.0, 0.0), (2.0, 0.0, 0.0))
+    assert judged.traversable, judged.reason
+    assert np.hypot(*(judged.candidate.poses[-1][:2] - (0.2, 0.0))) >= 1.5
+
+
+@pytest.mark.parametrize("planner", [AUTO, LATTICE])
+def test_a_search_ends_near_a_goal_where_the_rover_cannot_stand(planner):
+    """Behind a wall that refuses all candidates, the goal itself was refused."""
+
+    def wall_and_rock(x, y):
+        wall = (np.abs(x) < 0.1) & (np.abs(y) < 1.2)
+        return np.where(wall | (np.hypot(x - 1.6, y) < 0.3), 1.0, 0.0)
+
+    walled = make_terrain(wall_and_rock, half=3.0)
+    service = make_service(walled, planner=planner, lattice_cell=0.25, search_budget=60.0)
+    asked = (-1.6, 0.0, 0.0), (1.6, 0.0, 0.0)
+    assert not service.snapshot().answer(*asked).traversable
+    judged = service.snapshot().answer(*asked, tolerance=1.0)
+    assert judged.traversable, judged.reason
+    assert 0.3 < judged.search.goal_offset <= 1.0
+
+
 def test_a_rover_may_leave_a_place_but_not_go_on_into_it():
     marked = MarkedPlaces((PLACE,))
     ends = (1.3, 0.5), (1.3, 1.4), (1.6, 2.5), (1.3, 1.3)
@@ -94,6 +141,20 @@ def flat_with_hole() -> Terrain:
     return Terrain(np.where(hole, np.nan, 0.0), 0.05, (-1.0, -2.0))
 
 
+def test_goals_near_a_goal_are_over_seen_ground_and_outside_marked_places():
+    ground, rover, hole = flat_with_hole(), load_rover("lsr1"), np.array([1.5, 0.0, 0.0])
+    seen = observed_ground(ground, None)
+    marked = MarkedPlaces((replace(PLACE, x=2.4, radius=0.4),))
+    options, check = PathQueryOptions(accepted_chance=1.0), UnobservedCheck(seen, REFUSE)
+    judge = PathJudge(Site(rover, ground, options, check, marked))
+    goals = np.array(
+        [goal for ring in judge.goals_near(np.array(START), hole, 0.8) for goal in ring]
+    )
+    assert 8 < len(goals) < 32
+    assert not seen.refused_below(rover, goals, REFUSE).any()
+    assert np.hypot(*(goals[:, :2] - (2.4, 0.0)).T).min() >= 0.4
+
+
 def test_a_search_leads_around_ground_never_seen_until_it_is_seen():
     memory, ground, rover = EdgeMemory(), flat_with_hole(), load_rover("lsr1")
     unseen = observed_ground(ground, None)
@@ -101,10 +162,9 @@ def test_a_search_leads_around_ground_never_seen_until_it_is_seen():
     filled = ObservedGround(unseen.terrain, kinds)
 
     def search(seen: ObservedGround, rule=ALLOW_FOOTPRINT, start=START):
-        check = UnobservedCheck(rover, seen, rule)
         options = PathQueryOptions(waypoint_spacing=0.04)
-        query = SearchQuery(rover, ground, start, GOAL, options, check)
-        return find_path(query, LatticeSettings(budget=60.0), memory)
+        site = Site(rover, ground, options, UnobservedCheck(seen, rule))
+        return find_path(SearchQuery(site, start, GOAL), LatticeSettings(budget=60.0), memory)
 
     around, warm = search(unseen).path.poses, search(filled).path.poses
     assert np.abs(around[:, 1]).max() > 0.2 and np.abs(warm[:, 1]).max() < 0.05

@@ -15,7 +15,8 @@ from rover_planner.planning.search import lattice_search, query
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.graph import ShortestPaths, edge_cost
 from rover_planner.planning.search.ground_estimate import FULL_DOUBT, estimate_ground
-from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.judge import PathJudge, cost_of_path
+from rover_planner.planning.search.lattice_search import join_pieces
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.path_search import (
     FOUND,
@@ -24,8 +25,11 @@ from rover_planner.planning.search.path_search import (
     OUT_OF_TIME,
     find_path,
 )
+from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.site import Site
 from support.grounds import make_terrain, pen, raised, waves
+from support.paths import poses_at
 from support.rough_grounds import fractal, plane, rocky
 from support.rovers import LSR1
 from support.services import load_settings
@@ -41,7 +45,7 @@ def long_wall(x, y):
 
 
 def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
-    return SearchQuery(rover, terrain, start, goal, OPTIONS.change(**options))
+    return SearchQuery(Site(rover, terrain, OPTIONS.change(**options)), start, goal)
 
 
 @pytest.fixture(scope="module")
@@ -53,20 +57,20 @@ def around():
 
 def test_a_way_that_passes_leads_to_the_goal_around_a_wall_that_refuses_all_candidates(around):
     question, answer, _ = around
-    assert not answer_path_query(LSR1, question.terrain, START, GOAL, OPTIONS).traversable
+    assert not answer_path_query(LSR1, question.site.terrain, START, GOAL, OPTIONS).traversable
     assert answer.outcome == FOUND and not answer.reason
     assert 0.0 < answer.seconds_first <= answer.seconds < 60.0
     poses = answer.path.poses
     assert poses[:, 1].max() > 2.0
     np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-12)
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= OPTIONS.waypoint_spacing + 1e-9
-    _, verdict = judge_path(LSR1, question.terrain, poses, OPTIONS.model)
+    _, verdict = judge_path(LSR1, question.site.terrain, poses, OPTIONS.model)
     assert verdict.traversable, verdict.reason
 
 
 def test_a_search_that_ends_by_itself_is_near_the_best_and_judges_few_edges(around):
     _, answer, _ = around
-    assert answer.repeatable and 1.0 <= answer.bound <= 1.0201
+    assert answer.repeatable and 1.0 <= answer.suboptimality <= 1.0201
     assert 0 < answer.edges_judged < 0.1 * answer.edges and answer.warning == ""
 
 
@@ -123,8 +127,8 @@ def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(
     assert (again.edges_judged, again.cost) == (answer.edges_judged, answer.cost)
     known = find_path(question, LONG, memory)  # hardly anything is judged again
     assert known.edges_judged < 0.5 * answer.edges_judged
-    assert known.bound <= 1.0201 and known.cost == pytest.approx(answer.cost, rel=0.03)
-    assert find_path(ask(question.terrain, friction=0.5), LONG, memory).edges_judged > 0
+    assert known.suboptimality <= 1.0201 and known.cost == pytest.approx(answer.cost, rel=0.03)
+    assert find_path(ask(question.site.terrain, friction=0.5), LONG, memory).edges_judged > 0
 
 
 def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
@@ -165,7 +169,7 @@ def test_a_rover_that_slips_up_a_slope_of_sand_may_back_out():
     """It was told that it cannot stand at the start."""
     slope = make_terrain(lambda x, y: 0.2 * np.maximum(x, 0.0), half=2.2)
     question = ask(slope, (1.0, 0.0, 0.0), (-0.8, 0.0, 0.0), soil="dry_sand", accepted_chance=1.0)
-    ahead = judge_path(LSR1, slope, [question.start], question.options.model)[1]
+    ahead = judge_path(LSR1, slope, [question.start], question.site.options.model)[1]
     assert ahead.code == "friction"
     answer = find_path(question, replace(LONG, cell=0.4, ends_at_first=True))
     assert answer.outcome == FOUND and answer.path.verdict.traversable
@@ -188,7 +192,7 @@ def test_impossible_ends_and_settings_are_refused_by_name(start, goal, said):
 
 def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_search(around):
     question, first, memory = around
-    before, memory = question.terrain, deepcopy(memory)
+    before, memory = question.site.terrain, deepcopy(memory)
     x = before.origin[0] + before.resolution * np.arange(before.elevation.shape[1])
     longer = np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)
     after = raised(before, longer, 1.0)
@@ -204,7 +208,7 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
 def test_the_last_way_is_the_first_path_after_a_change_of_the_map_that_it_passes(around):
     question, first, memory = around
     memory, asked = deepcopy(memory), replace(LONG, ends_at_first=True)
-    after = raised(question.terrain, np.s_[:3], 0.02)  # far from the way
+    after = raised(question.site.terrain, np.s_[:3], 0.02)  # far from the way
     again = find_path(ask(after), asked, memory)
     assert again.outcome == FOUND and again.expanded == 0
     np.testing.assert_array_equal(again.path.poses, first.path.poses)
@@ -222,7 +226,7 @@ def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
     groundless = np.flatnonzero(estimate.groundless)
     assert 0.1 * nodes.count < len(groundless) < nodes.count
     chosen = rng.choice(groundless, 2000, replace=False)
-    codes = PathJudge(LSR1, ground, OPTIONS).stand(nodes.poses(chosen))
+    codes = PathJudge(Site(LSR1, ground, OPTIONS)).stand(nodes.poses(chosen))
     assert set(codes) <= {"unknown_ground", "off_map"}
 
 
@@ -230,7 +234,7 @@ def test_nodes_where_tilt_moves_a_wheel_off_unknown_ground_are_only_doubted():
     spirit = load_terrain("spirit")
     nodes = nodes_within(0.04, (-47.12, -19.92), (-45.88, -19.2))
     estimate = estimate_ground(LSR1, spirit, nodes)
-    codes = PathJudge(LSR1, spirit, OPTIONS).stand(nodes.poses(np.arange(nodes.count)))
+    codes = PathJudge(Site(LSR1, spirit, OPTIONS)).stand(nodes.poses(np.arange(nodes.count)))
     stands = np.array([code == "" for code in codes])
     assert not (stands & estimate.groundless).any()
     assert (stands & (estimate.doubt == FULL_DOUBT)).any()
@@ -245,12 +249,12 @@ def test_only_the_heights_around_the_window_are_looked_at(monkeypatch):
     row, column = np.array(nodes.shape) / 2
     centre = nodes.cell * (nodes.first[0] + column), nodes.cell * (nodes.first[1] + row)
     np.testing.assert_allclose(centre, (12.0, 12.0), atol=0.5)
-    part = query.cut_out(question, nodes)
+    part = query.cut_out(question.site, nodes)
     assert part.elevation.size < 0.15 * wide.elevation.size
     estimate = estimate_ground(LSR1, part, nodes)
     assert not estimate.groundless.any() and not estimate.doubt.any()
     assert find_path(question, LONG).outcome == FOUND
-    enclosed = replace(question, terrain=raised(wide, np.s_[:, 430], 3.0))
+    enclosed = ask(raised(wide, np.s_[:, 430], 3.0), question.start, question.goal)
     refused = find_path(enclosed, LatticeSettings(budget=0.3))
     assert refused.outcome in (OUT_OF_TIME, NO_WAY)
     assert "m around start and goal" in refused.reason
@@ -313,7 +317,7 @@ def slippery():
 def ask_across(ground, accepted_chance):
     """Return the question of a server that leads across the middle."""
     asked = load_settings(waypoint_spacing=0.05, accepted_chance=accepted_chance).query
-    return SearchQuery(LSR1, ground, (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0), asked)
+    return SearchQuery(Site(LSR1, ground, asked), (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0))
 
 
 @pytest.mark.long
@@ -325,11 +329,28 @@ def test_a_search_goes_around_what_its_chance_refuses(slippery):
     assert np.abs(answer.path.poses[:, 1]).max() > 0.5
 
 
+def test_a_path_costs_as_much_as_its_pieces_each_in_its_gear():
+    """Where chances are weighed, a path was priced as if all of it were driven forwards."""
+    level, x = make_terrain(lambda x, y: 0.0 * x, half=1.5), np.linspace(-0.5, 0.5, 41)
+    judge = PathJudge(Site(LSR1, level, OPTIONS.change(accepted_chance=1.0)))
+    ahead = Piece(poses_at(x), Gear.FORWARD)
+    pieces = [ahead, Piece(ahead.poses[::-1], Gear.BACKWARD)]
+    path = judge.check(join_pieces(pieces)[0])
+    alone = sum(one.cost for one in judge.judge_pieces(pieces))
+    assert cost_of_path(LSR1, pieces, path) == pytest.approx(alone, rel=0.02)
+
+
 def test_a_search_goes_around_what_may_fail_if_the_weight_of_chances_pays_for_it(slippery):
     question, coarse = ask_across(slippery, 1.0), replace(LONG, cell=0.3)
     straight = find_path(question, coarse).path
     assert np.abs(straight.poses[:, 1]).max() < 0.5
-    answer = find_path(question, replace(coarse, chance_weight=50.0))
+    told: list[bool] = []
+    answer = find_path(
+        question,
+        replace(coarse, chance_weight=50.0),
+        on_progress=lambda progress: told.append(progress.best is not None),
+    )
+    assert told == sorted(told)  # a path that was found stays so
     path, chance = answer.path, answer.report()["failure_chance"]
     assert answer.outcome == FOUND and path.verdict.failure_chance == chance < 0.05
     assert np.abs(path.poses[:, 1]).max() > 0.5 and path.length > straight.length + 0.1

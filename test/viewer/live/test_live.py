@@ -141,9 +141,11 @@ def test_estimates_take_precedence_over_predictions_and_forces_end_with_their_so
     assert not listener.latest().forces and listener.latest().plan is not None
 
 
-def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, listener, talker):
+def test_what_is_invalid_or_missing_is_unknown_and_plans_are_refused(ros, listener, talker):
     assert read_state(LSR1, listener.latest()) is None
     assert listener.latest().terrain is None and listener.latest().newest is None
+    with pytest.raises(PlanningError, match="odometry"):
+        listener.request_plan(np.zeros(2))
     broken = JointState(name=["rocker_right"], position=[float("nan")])
     talker.joints.publish(broken)
     talker.odometry.publish(odometry(x=float("inf")))
@@ -156,6 +158,8 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     for values in (state.wheel_loads, state.friction_use, state.torque_use):
         assert np.isnan(values).all()
     assert listener.latest().forces_from == ""
+    with pytest.raises(PlanningError, match="can_traverse"):
+        listener.request_plan(np.zeros(2))
 
 
 def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
@@ -185,14 +189,6 @@ def test_a_trail_keeps_places_a_step_apart_and_the_newest_of_many():
     steps = np.diff(trail.places[:-1, 0])
     assert len(trail.places) <= MAX_TRAIL + 1 and trail.places[-1, 0] == pytest.approx(149.96)
     assert steps.min() > 0.5 * TRAIL_STEP and trail.add(ground, None).places is trail.places
-
-
-def test_a_plan_needs_odometry_and_a_server(listener, talker):
-    with pytest.raises(PlanningError, match="odometry"):
-        listener.request_plan(np.zeros(2))
-    publish_until(talker.odometry, odometry(), lambda: has_place(listener), "odometry")
-    with pytest.raises(PlanningError, match="can_traverse"):
-        listener.request_plan(np.zeros(2))
 
 
 def test_a_closed_link_leaves_no_thread_and_no_context():

@@ -4,9 +4,9 @@
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
-from rover_planner.maps.living_map import LivingMap, MapSnapshot
 from rover_planner.maps.moved_map import Move, move_map
 from rover_planner.parameters.traverse_server import AUTO, MERGE, TraverseServerParameters
+from rover_planner.planning.answering.living_map import LivingMap, MapSnapshot
 
 
 class MapKeeper:
