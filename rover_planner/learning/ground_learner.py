@@ -87,6 +87,8 @@ JUMP = 0.05
 """Step of the position beyond what the wheels can drive that is no motion [m]."""
 CHANGE_CERTAIN = 2.0
 """Standard deviations that are no change of a suspension angle."""
+EARLY = 0.3
+"""Share of the time since the last row by which a block may end early: stamps are not regular."""
 
 Flags = NDArray[np.bool_]
 _RATES, _TORQUES = RATES.start, TORQUES.start
@@ -213,7 +215,7 @@ class GroundLearner:
             self._slipping[:] = 0
         else:
             self._health.take(row)
-        is_full = time >= self._block_end - 1e-9
+        is_full = time >= self._block_end - EARLY * elapsed
         if is_full and (self._block["known"][0, : SUSPENSION.stop] > 0.0).all():
             new = self._think(self._block[0])
             self._block_end = np.inf

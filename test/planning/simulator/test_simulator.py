@@ -83,6 +83,16 @@ def test_no_wheel_turns_faster_than_its_motor_where_it_drops_off_an_edge():
     assert np.diff(spins, axis=0) == pytest.approx(STEP * np.array(rates))
 
 
+@ENGINES
+def test_a_command_beyond_the_motors_is_driven_at_their_speed_on_its_curve(engine):
+    plant, duration = engine(LSR1, LEVEL, (0.0, 0.0, 0.0)), 6.0
+    drive(plant, duration, 1.0, 1.0)
+    x, y, yaw = plant.pose()
+    fastest = LSR1.wheel.max_speed * LSR1.wheel.radius / np.hypot(1.31, 0.4)  # front right wheel
+    assert 0.5 * fastest < yaw / duration < fastest
+    assert (x, y) == pytest.approx((np.sin(yaw), 1.0 - np.cos(yaw)), abs=0.02)
+
+
 def test_it_stops_before_a_wall_and_says_why_and_can_go_back():
     ground = make_terrain(lambda x, y: waves(x, y) + 0.5 * (x > 1.0), half=3.0)
     plant = QuasiStaticPlant(LSR1, ground, (0.4, 0.0, 0.0))
