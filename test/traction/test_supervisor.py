@@ -135,6 +135,14 @@ def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_othe
         assert rig.run(PERIOD).state == ("driving" if enabled else "disabled")
 
 
+def test_a_rover_that_climbs_slowly_is_not_stalled():
+    rig = CreepingRover(stall_time=2.0)
+    rig.turn_wheels(0.0)
+    for _ in range(150):
+        rig.positions["bogie_left"] += 0.002
+        assert rig.run(PERIOD).state == "driving"
+
+
 @pytest.mark.parametrize("wanted", [(-0.3, 0.3), (0.3, 0.0)])
 def test_a_rover_that_does_not_turn_is_stalled_one_that_turns_is_not(wanted):
     turns = np.repeat(wanted, 3)
