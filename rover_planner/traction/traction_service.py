@@ -280,11 +280,6 @@ class TractionService:
         """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
         self._torques = torques.copy()
 
-    def update(self, now: float) -> TractionCommand:
-        """Return the command for time `now` [s], on the same clock as the inputs."""
-        fault = self.find_fault(now)
-        return self.rest(fault) if fault else self.drive(now)
-
     def drive(self, now: float) -> TractionCommand:
         """Return the command for time `now` [s], at which the inputs have no fault."""
         start = time.perf_counter()

@@ -142,6 +142,13 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
+def test_stamps_that_are_not_regular_make_windows_no_longer():
+    rows = climb(ROVER, SLOPE, 12.0)[::5]
+    regular = learn(rows).window
+    rows[:, TIME] += np.random.default_rng(3).uniform(-0.005, 0.005, len(rows))
+    assert learn(rows).window.duration == pytest.approx(regular.duration, abs=0.02)
+
+
 def test_a_drive_after_the_clock_was_set_back_is_learned_as_another_one():
     rows = climb(ROVER, SLOPE, 12.0)[::2]
     again = rows.copy()
@@ -176,6 +183,21 @@ def test_a_bad_sensor_is_told_and_not_believed(sensors, spoil, word):
     assert estimate.faults == {"middle_left": word}
     assert estimate.friction.high is None
     assert estimate.friction.low < 1.2 * SLOPE
+
+
+def test_coarse_rates_whose_last_digit_turns_at_three_wheels_only_are_not_frozen():
+    rows, digit = climb(ROVER, SLOPE, 8.0)[::2], 0.05
+    rates = 0.4 + 0.004 * np.random.default_rng(4).standard_normal((len(rows), 6))
+    rates[:, :3] += 0.5 * digit
+    rows[:, RATES] = digit * np.round(rates / digit)
+    assert not learn(rows).estimate.faults
+
+
+def test_torques_of_a_rover_that_stands_are_not_frozen_because_others_are_missing():
+    rows = climb(ROVER, 0.0, 8.0)[::5]
+    rows[rows[:, TIME] > 4.0, TORQUES] = 0.0
+    rows[:, TORQUES.start : TORQUES.start + 3] = np.nan
+    assert set(learn(rows, ramp(0.0)).estimate.faults.values()) == {"no torque"}
 
 
 def test_torques_that_wheels_apply_to_each_other_on_the_spot_are_no_wrong_signs():

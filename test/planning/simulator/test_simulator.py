@@ -9,9 +9,9 @@ import pytest
 from rover_physics import SweepOptions, judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.traction.balance import BalanceWriter
+from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.planning.angles import wrap
 from rover_planner.simulator import range_sensor
 from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_rover import MujocoRover
