@@ -214,6 +214,7 @@ def test_a_path_that_mostly_turns_on_the_spot_is_driven_backward():
 def test_the_way_around_passes_and_is_as_long_for_the_size_of_the_rover(size, monkeypatch):
     unhurried = replace(SEARCH, budget=30.0)  # a busy machine is slow
     monkeypatch.setattr("rover_planner.advice.case.SEARCH", unhurried)
+
     def way_around(size: float) -> float:
         ground = enlarged(make_terrain(rock_left, half=3.0), size)
         poses = STRAIGHT * [size, size, 1.0]

@@ -108,6 +108,8 @@ def test_a_fault_found_elsewhere_counts_from_the_next_update_on():
     rig.supervisor.trip("updates came too late")
     assert rig.run(RECOVERY_TIME - PERIOD).fault == "updates came too late"
     assert rig.run(1.0).state == "driving"
+    command = rig.supervisor.fail("an error")
+    assert command.brake and not command.torques.any() and rig.run(PERIOD).fault == "an error"
 
 
 def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_otherwise():

@@ -146,7 +146,27 @@ def test_it_pushes_up_a_slope_with_the_weight_along_it_within_a_third_of_a_secon
     wanted = rover.weight * np.sin(-rig.pitch) * rover.wheel.radius
     while rig.run(PERIOD).torques.sum() < 0.9 * wanted:
         assert rig.now < 0.33
-    assert rig.run(1.2).torques.sum() == pytest.approx(wanted, rel=0.01)
+    update = rig.run(1.2)
+    assert update.torques.sum() == pytest.approx(wanted, rel=0.01)
+    assert update.answer.loads[0] > 1.2 * update.answer.loads[2]  # rear and front
+
+
+def test_torques_that_are_no_numbers_are_a_fault(monkeypatch):
+    rig = Rig()
+    answer = replace(rig.run(0.6).answer, torques=np.full(6, np.nan))
+    monkeypatch.setattr(rig.service, "_share_torques", lambda rows: answer)
+    update = rig.run(PERIOD)
+    assert "must be finite" in update.fault and not update.torques.any()
+
+
+def test_wheels_that_spin_are_slowed_and_do_not_hide_that_the_others_stand():
+    rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
+    rig.turn_wheels(0.0)
+    rig.velocities |= dict.fromkeys(("front_right_wheel", "front_left_wheel"), 1.0)
+    before, after = rig.run(0.2).torques, rig.run(4.0).torques
+    assert before[2] < 0.0 < before[0]
+    assert after[0] > 2.0 * before[0]
+    assert np.abs(after).max() == LSR1.wheel.max_torque
 
 
 # Wheels that steer
@@ -181,7 +201,7 @@ def test_a_rover_that_turns_unasked_is_turned_back():
     rig = Rig()
     rig.roll(1.0)
     rig.rates = np.array([0.0, 0.0, 0.05])  # to the left
-    right, left = np.split(rig.run(30).torques, 2)
+    right, left = np.split(rig.run(0.6).torques, 2)
     assert right.max() < -1e-3 and left.min() > 1e-3
 
 
