@@ -345,6 +345,8 @@ class GroundLearner:
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
+        # No ground pulls: where a load says so, the balance is wrong for all wheels.
+        counts &= bool((loads + window.doubts).min() > -MIN_LOAD * unit)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
         sticking = fluctuation * (1.0 - np.abs(window.ratio))
         is_clear = (sticking < MOST_STICKING) & (window.doubts < MOST_DOUBT * loads)

@@ -105,6 +105,16 @@ def test_torques_beyond_what_holds_the_rover_make_a_slip_tell_less_surely():
     assert pushed.high / pushed.low > 1.08 * held.high / held.low
 
 
+def test_loads_that_no_ground_gives_tell_nothing():
+    rows = climb(ROVER, SLOPE, 20.0, speed=0.02)[::5]
+    rows[:, RATES] *= 3.5
+    # Two rear wheels pull back and one bogie pushes: its front wheel would hang on the ground.
+    rows[:, TORQUES] += [-2.0, 2.0, 2.0, -2.0, 0.0, 0.0]
+    learner = learn(rows)
+    assert learner.window.loads[2] < -0.1 * ROVER.weight
+    assert learner.estimate.friction.high is None and learner.estimate.friction.low < 0.1
+
+
 def test_wheels_whose_slip_is_hidden_by_noise_prove_no_friction():
     rows = climb(ROVER, SLOPE, 20.0)[::5]
     rows[rows[:, X] > 0.0, RATES] *= 3.0
