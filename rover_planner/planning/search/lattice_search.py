@@ -74,7 +74,7 @@ class SearchProgress:
 
 
 class _Ends:
-    """The connections of the start or of the goal, with what is known of them."""
+    """The connections of the start or of the goals, with what is known of them."""
 
     def __init__(self, connections: list[Connection]):
         self.connections = connections
@@ -116,7 +116,7 @@ Part = tuple[Edges | _Ends, int]
 
 @dataclass
 class LatticeSearch:
-    """A search between two poses over the edges of a lattice."""
+    """A search from a start to one of some goals over the edges of a lattice."""
 
     judge: PathJudge
     """The model."""
@@ -125,7 +125,7 @@ class LatticeSearch:
     starts: list[Connection]
     """Connections from the start to nodes."""
     goals: list[Connection]
-    """Connections from nodes to the goal."""
+    """Connections from nodes to the goal, or to all that are allowed."""
     doubt: NDArray[np.float32]
     """(nodes,) doubt that the rover can be at a node, 0 for none; grows with the search."""
     difficulty: Difficulty

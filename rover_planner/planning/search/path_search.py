@@ -283,9 +283,9 @@ class _PathFinder:
 
     def _describe_rest(self, path: Candidate) -> str:
         """Return how far before a goal on unknown ground a path ends, in words."""
-        left = np.hypot(*(path.poses[-1] - self._goal)[:2])
         if not self._to_frontier:
             return ""
+        left = np.hypot(*(path.poses[-1] - self._goal)[:2])
         return f"the goal is beyond the known ground; the path ends {left:.1f} m before it"
 
     def _describe_extent(self) -> str:
