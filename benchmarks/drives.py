@@ -135,7 +135,8 @@ def make_controller(
         service.take_attitude(*plant.attitude, plant.body_rates, now)
         service.take_command(*command, now)
         service.take_odometry(np.append(plant.position, plant.pose()[2]), 0.0, now)
-        torques = service.update(now).torques
+        fault = service.find_fault(now)
+        torques = (service.rest(fault) if fault else service.drive(now)).torques
         plant.step(torques, PERIOD)
         return torques
 

@@ -44,7 +44,7 @@ def drive(with_traction_control: bool) -> np.ndarray:
             service.take_joints(plant.joint_positions, plant.joint_velocities, now)
             service.take_attitude(*plant.attitude, plant.body_rates, now)
             service.take_command(SPEED, 0.0, now)
-            torques = service.update(now).torques
+            torques = service.drive(now).torques
             plant.step(torques, PERIOD)
         else:
             torques = plant.servo(rates, PERIOD)

@@ -53,6 +53,7 @@ class SteeredDrive:
         """(6,) True for wheels that steer."""
         self._limit = float(self._linkages["steering_limit"][0])
         self._rate = float(self._linkages["steering_rate"][0])
+        self._max_speed = rover.wheel.max_speed * rover.wheel.radius
 
     def aim(self, speed: float, yaw_rate: float) -> WheelAims:
         """Return what a speed ahead [m/s] and a yaw rate [rad/s] of the body origin ask for."""
@@ -68,6 +69,17 @@ class SteeredDrive:
             f"{WHEELS[wheel]} wheel needs a steering angle of {needed:.1f} deg; "
             f"the limit is {limit:.1f} deg",
         )
+
+    def clip(self, speed: float, yaw_rate: float) -> tuple[float, float]:
+        """Return a speed [m/s] and yaw rate [rad/s] at which no wheel exceeds its largest speed.
+
+        Both are scaled by the same factor, so that the curvature stays.
+        """
+        if speed == yaw_rate == 0.0:
+            return 0.0, 0.0
+        fastest = float(np.abs(self.aim(speed, yaw_rate).speeds).max())
+        share = self._max_speed / max(fastest, self._max_speed)
+        return share * speed, share * yaw_rate
 
     def turn(self, angles: Floats, aims: Floats, duration: float) -> Floats:
         """Return angles (6,) [rad] after steering towards `aims` at the largest rate."""

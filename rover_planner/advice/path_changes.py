@@ -8,7 +8,7 @@ waypoint of one is the shifted waypoint of the other.
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.candidates import turn_and_drive, turn_on_the_spot
 from rover_planner.planning.path_geometry import distance_along
 

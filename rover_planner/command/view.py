@@ -222,7 +222,7 @@ def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
     """
     import numpy as np
 
-    from rover_planner.planning.goals import choose_mission
+    from rover_planner.demo.goals import choose_mission
 
     low, high = _ends_about_the_middle(rover, ground)
     between = np.linspace(low[:2], high[:2], PLACES_TRIED)

@@ -29,9 +29,9 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
+from rover_planner.demo.goals import Mission, Pose, choose_mission
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.known_map import describe_terrain
-from rover_planner.planning.goals import Mission, Pose, choose_mission
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
@@ -293,7 +293,7 @@ def _draw(
 ) -> int:  # fmt: skip
     """Draw the picture; return how many verdicts agree with those computed here."""
     with steps.step("draw the picture") as status:
-        from rover_planner.figures.plots import draw_answers
+        from rover_planner.demo.answers_picture import draw_answers
 
         answered = []
         for goal in mission.goals:

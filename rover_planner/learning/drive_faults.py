@@ -43,7 +43,7 @@ def check_angles(rows: Floats, source: object) -> None:
         if wrong.sum() > MOST_SPIKES * np.isfinite(values).sum():
             at = int(np.argmax(wrong))
             raise PlanningError(
-                f"{source}: {name} is {values[at]:g} at {rows[at, TIME]:g} s, and beyond "
+                f"{source}: {name} is {values[at]:g} at {rows[at, TIME]:.13g} s, and beyond "
                 f"{largest:.3g} rad in {wrong.mean():.0%} of the rows; angles must be in rad"
             )
 

@@ -70,7 +70,7 @@ def check_rows(rows: Floats, source: str) -> Floats:
     steps = np.diff(rows[:, TIME])
     if (steps < 0.0).any():
         at = int(np.argmin(steps >= 0.0))
-        raise PlanningError(f"{source}: time goes back after {rows[at, TIME]:g} s")
+        raise PlanningError(f"{source}: time goes back after {rows[at, TIME]:.13g} s")
     rows = rows[np.append(True, steps > 0.0)]
     known = np.isfinite(rows[:, YAW])
     rows[known, YAW] = np.unwrap(rows[known, YAW])

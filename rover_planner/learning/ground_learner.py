@@ -87,6 +87,8 @@ JUMP = 0.05
 """Step of the position beyond what the wheels can drive that is no motion [m]."""
 CHANGE_CERTAIN = 2.0
 """Standard deviations that are no change of a suspension angle."""
+EARLY = 0.3
+"""Share of the time since the last row by which a block may end early: stamps are not regular."""
 
 Flags = NDArray[np.bool_]
 _RATES, _TORQUES = RATES.start, TORQUES.start
@@ -207,11 +209,13 @@ class GroundLearner:
             return False
         elapsed, self._time, new = time - last, time, False
         if not 0.0 <= elapsed <= LONGEST_GAP or self._jumps(row):
-            self._begin()
-            elapsed = 0.0
+            elapsed, self._block_end = 0.0, np.inf
+            self._windows.begin()
+            self._recent.clear()
+            self._slipping[:] = 0
         else:
             self._health.take(row)
-        is_full = time >= self._block_end - 1e-9
+        is_full = time >= self._block_end - EARLY * elapsed
         if is_full and (self._block["known"][0, : SUSPENSION.stop] > 0.0).all():
             new = self._think(self._block[0])
             self._block_end = np.inf
@@ -229,12 +233,6 @@ class GroundLearner:
         self._place = self._time, x, y
         most = 2.0 * wheel.max_speed * wheel.radius * (self._time - before)
         return not math.hypot(x - last_x, y - last_y) <= most + JUMP
-
-    def _begin(self) -> None:
-        self._block_end = np.inf
-        self._windows.begin()
-        self._recent.clear()
-        self._slipping[:] = 0
 
     def _think(self, block: Any) -> bool:
         """Take a block of measurements, _SUMS; return whether it ends a window."""
@@ -291,18 +289,16 @@ class GroundLearner:
         on_class: Mapping[int, Flags],
         elapsed: float,
     ) -> None:
-        faults = self._health.faults
-        good = measured & np.array([name not in faults for name in WHEELS])
-        slipping = self._find_slips(window)
-        self._health.take_window(window, elapsed, not slipping.any())
-        self._slipping = np.where(slipping, self._slipping + 1, 0)
-        turning = ~self._health.doubtful & ~self._health.rolls_backward(window)
+        health, faults = self._health, self._health.faults
+        turning = ~health.doubtful & ~health.rolls_backward(window)
         turning &= np.array([RATE not in faults.get(name, "") for name in WHEELS])
+        good = measured & turning & np.array([name not in faults for name in WHEELS])
+        slipping = self._find_slips(window)
+        health.take_window(window, elapsed, not slipping.any())
+        self._slipping = np.where(slipping, self._slipping + 1, 0)
         lasting = (self._slipping >= LASTING) & turning
         if lasting.any() and self._slip_time is None:
             self._slip_time = window.time
-        good &= turning
-        slips, grips = lasting & good, ~slipping
         rows = np.array([row for row, _, _ in self._recent])
         torques = rows[:, TORQUES].mean(axis=0)
         climb = _find_change(rows[:, [PITCH, *_ANGLES]])
@@ -312,21 +308,19 @@ class GroundLearner:
         steady = abs(window.unsteadiness) < MAX_UNSTEADY * self._rover.gravity * window.duration
         if not steady or not measured.any():
             return
+        wheel = self._rover.wheel
+        freely = np.abs(window.rolling) < FASTEST * wheel.max_speed * wheel.radius
         if self._soil is not None:
-            self._soil.take(window, good & self._turns_freely(window), elapsed)
-        if grips.all() and abs(float(window.rolling.mean())) > 3.0 * window.deviation:
+            self._soil.take(window, good & freely, elapsed)
+        if not slipping.any() and abs(float(window.rolling.mean())) > 3.0 * window.deviation:
             self._take_resistance(window, elapsed)
         grounds = [
             (self._whole, np.ones(WHEEL_COUNT, bool)),
             *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
             *((self._classes[number], wheels) for number, wheels in on_class.items()),
         ]
-        self._learn_friction(window, slips, grips & good, torques, grounds, elapsed)
-
-    def _turns_freely(self, window: SlipWindow) -> Flags:
-        """Return (6,) whether motors are slow enough to give the torque they are asked for."""
-        wheel = self._rover.wheel
-        return np.asarray(np.abs(window.rolling) < FASTEST * wheel.max_speed * wheel.radius)
+        slips, grips = lasting & good & freely, ~slipping & good
+        self._learn_friction(window, slips, grips, torques, grounds, elapsed)
 
     def _find_slips(self, window: SlipWindow) -> Flags:
         """Return (6,) whether wheels slip."""
@@ -351,18 +345,18 @@ class GroundLearner:
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
+        # No ground pulls: where a load says so, the balance is wrong for all wheels.
+        counts &= bool((loads + window.doubts).min() > -MIN_LOAD * unit)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
         sticking = fluctuation * (1.0 - np.abs(window.ratio))
-        tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
-        tells &= sticking < MOST_STICKING
-        tells &= window.doubts < MOST_DOUBT * loads
-        tells &= self._turns_freely(window)
+        is_clear = (sticking < MOST_STICKING) & (window.doubts < MOST_DOUBT * loads)
+        tells = slips & counts & is_clear & (along > ALONG) & (window.slip * tractions > 0.0)
         distance = abs(float(find_median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
         beyond = abs(window.excess - float((window.tractions - tractions).sum()))
         most = np.maximum(GRIP_SHARE * np.abs(window.rolling), self._least_slip)
-        grips = grips & (np.abs(window.slip) < most)
-        grips &= beyond < GRIP_EXCESS * self._sense.weight
+        is_right = beyond < GRIP_EXCESS * self._sense.weight
+        proves = grips & counts & (np.abs(window.slip) < most) & is_right
         proved = np.maximum(np.abs(tractions) - CERTAIN_GRIP * error, 0.0)
         shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
         noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * fluctuation**2)
@@ -374,7 +368,7 @@ class GroundLearner:
                 load, doubt = float(loads[told].sum()), window.doubts[told].sum()
                 noise = math.hypot(*noises[told], doubt, HIDDEN_SHARE * beyond) / load
                 one.slip(float(shears[told].sum()) / load, noise, float(weights[told].mean()))
-            held = np.sort((proved / np.maximum(loads, 1e-9))[counts & grips & own])
+            held = np.sort((proved / np.maximum(loads, 1e-9))[proves & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong
                 one.grip(float(held[-2]))
 

@@ -19,6 +19,9 @@ DOUBTFUL_TIME = 0.25
 """Time after which it may be frozen [s]."""
 OTHERS = 3
 """Number of other wheels whose values must change meanwhile."""
+CHANGE = 1.5
+"""Change over the smallest one ever seen from which a value changes: the last digit of a coarse
+sensor may turn at some wheels and stay at others."""
 SPIKE = 1.3
 """Torque over the largest one of a motor from which it is an error."""
 SIGN_TIME = 2.0
@@ -37,6 +40,7 @@ _ANGLES = slice(ROLL, SUSPENSION.stop)
 _WATCH = record_type(
     ("last", float, (2, WHEEL_COUNT)),  # last torques [N m] and rates [rad/s]
     ("still", float, (2, WHEEL_COUNT)),  # time for which each has stood still or was missing [s]
+    ("steps", float, (2,)),  # smallest changes of torques [N m] and rates [rad/s]
 )
 
 
@@ -47,6 +51,7 @@ class WheelHealth:
         """Start with good sensors of a rover of a weight [N] and a largest wheel torque [N m]."""
         self._weight, self._most = weight, max_torque
         self._watches = np.zeros(1, _WATCH)
+        self._watches["steps"] = np.inf
         self._still = self._watches["still"][0]
         self._time = np.nan
         self._excess = 0.0
@@ -136,7 +141,10 @@ def _take(row, elapsed, full, watches):
         first = _TORQUES if kind == 0 else _RATES
         changes = 0
         for wheel in range(WHEEL_COUNT):
-            if row[first + wheel] != watch.last[kind, wheel]:
+            change = abs(row[first + wheel] - watch.last[kind, wheel])
+            if change > 0.0:
+                watch.steps[kind] = min(watch.steps[kind], change)
+            if change > CHANGE * watch.steps[kind]:
                 changes += 1
         for wheel in range(WHEEL_COUNT):
             value = row[first + wheel]

@@ -16,11 +16,11 @@ import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_planner.angles import wrap
 from rover_planner.learning.drive_log import PITCH, RATES, ROLL, STEERING, TIME, TORQUES
 from rover_planner.learning.friction_filter import PRIOR_SPREAD
 from rover_planner.learning.wheel_health import WheelHealth
 from rover_planner.learning.wheel_slip import LONGEST_GAP
-from rover_planner.planning.angles import wrap
 
 FORWARD_PRIOR, SIDE_PRIOR = (0.03, 0.2), (0.2,)
 """Standard deviations before anything was learned: of the share of the distance that is lost
@@ -93,10 +93,12 @@ class WheelOdometry:
         """Standard deviation of it [m/s]."""
         self.time, self.yaw_rate = math.nan, math.nan
         """Time [s] and yaw rate [rad/s] of the last row; NaN before the first."""
-        self._sums, self._slides = np.zeros(13), np.zeros((2, 2))
-        self._forward_distances, self._noise = self._sums[:8].reshape(2, 2, 2)
-        self._side_distance, self._piece_distances = self._sums[8:10], self._sums[10:]
-        self._distance = self._elapsed = 0.0
+        # How far an error of 1 has moved the place, x and y [m]: of the two shares that are lost
+        # ahead, of that gone aside, of the slides ahead and aside.
+        self._shifts, self._noise = np.zeros((5, 2)), np.zeros((2, 2))
+        self._elapsed = self._distance = 0.0
+        # Of a piece: the distance that it rolled, times push, times side slope [m].
+        self._rolled = self._pushed = self._leaned = 0.0
         self._begin: Floats | None = None
 
     def take(self, row: Floats, yaw_rate: float) -> None:
@@ -124,7 +126,7 @@ class WheelOdometry:
         push = self._traction if raw > 0.0 else -self._traction
         slid, slide, slide_aside = self._find_slide(push, aside)
         rolled = (1.0 - slid) * raw
-        step = rolled * elapsed
+        way, step = raw * elapsed, rolled * elapsed
         everywhere, per_push = self.forward.mean.tolist()
         lost, drift = everywhere + per_push * push, float(self.side.mean[0]) * aside
         self.speed = rolled * (1.0 - lost)
@@ -135,21 +137,23 @@ class WheelOdometry:
         c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
         self.pose[0] += step * ((1.0 - lost) * c + drift * s)
         self.pose[1] += step * ((1.0 - lost) * s - drift * c)
+        self._shifts += np.array([
+            [c * step, s * step],
+            [c * push * step, s * push * step],
+            [-s * aside * step, c * aside * step],
+            [slide * c * way, slide * s * way],
+            [-slide_aside * s * way, slide_aside * c * way],
+        ])  # fmt: skip
         piece = math.copysign(self._piece, step)
         mixed = piece * (along - across) * c * s
         ahead_noise = piece * (along * c**2 + across * s**2)
         aside_noise = piece * (along * s**2 + across * c**2)
-        self._sums += step * np.array([
-            c, c * push, s, s * push,  # forward distances
-            ahead_noise, mixed, mixed, aside_noise,
-            -s * aside, c * aside,  # distance aside
-            1.0, push, aside,  # distances of the piece
-        ])  # fmt: skip
-        self._slides += (
-            raw * elapsed * np.array([[slide * c, slide * s], [-slide_aside * s, slide_aside * c]])
-        )
+        self._noise += step * np.array([[ahead_noise, mixed], [mixed, aside_noise]])
         self._elapsed += elapsed
         self._distance += abs(step)
+        self._rolled += step
+        self._pushed += step * push
+        self._leaned += step * aside
 
     def _find_slide(self, push: float, aside: float) -> tuple[float, float, float]:
         """Return the share of the distance that sliding wheels lose, and its standard deviation.
@@ -187,14 +191,14 @@ class WheelOdometry:
             if self._begin is not None and np.isfinite(pose).all():
                 self._learn_piece(self._begin, pose)
             self._begin, self._distance = np.array(pose), 0.0
-            self._piece_distances[:] = 0.0
+            self._rolled = self._pushed = self._leaned = 0.0
 
     def _learn_piece(self, begin: Floats, end: Floats) -> None:
         """Learn from a piece of the path between two measured poses."""
         step, yaw = end[:2] - begin[:2], begin[2] + 0.5 * float(wrap(end[2] - begin[2]))
         ahead = float(step @ [np.cos(yaw), np.sin(yaw)])
         left = float(step @ [-np.sin(yaw), np.cos(yaw)])
-        distances = self._piece_distances / self._distance
+        distances = np.array([self._rolled, self._pushed, self._leaned]) / self._distance
         if abs(distances[0]) > 0.9:  # it did not go back and forth
             self.forward.add(distances[:2], distances[0] - ahead / self._distance)
             self.side.add(distances[2:], -left / self._distance)
@@ -204,12 +208,13 @@ class WheelOdometry:
         """Covariance (3, 3) of the pose."""
         yaw = GYRO_NOISE**2 * self._elapsed + (GYRO_BIAS * self._elapsed) ** 2
         across = np.array([-self.pose[1], self.pose[0]])
+        forward, side, slides = self._shifts[:2], self._shifts[2], self._shifts[3:]
         result = np.zeros((3, 3))
         result[:2, :2] = (
             self._noise
-            + self._forward_distances @ self.forward.covariance @ self._forward_distances.T
-            + self.side.covariance[0, 0] * np.outer(self._side_distance, self._side_distance)
-            + self._slides.T @ self._slides
+            + forward.T @ self.forward.covariance @ forward
+            + self.side.covariance[0, 0] * np.outer(side, side)
+            + slides.T @ slides
             + yaw / 3.0 * np.outer(across, across)
         )
         result[2, 2] = yaw

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.angles import wrap
 from rover_planner.maps.cells import CellBox, grid_of
 from rover_planner.maps.layers import FOOTPRINT, CellSources
 
@@ -100,7 +101,7 @@ class ObservedGround:
     ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         """Return the poses at which the belly has moved on by a cell, and their indices."""
         steps = np.diff(poses, axis=0)
-        turns = np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
+        turns = np.abs(wrap(steps[:, 2]))
         moved = np.hypot(*steps[:, :2].T) + _corner_distance(rover) * turns
         distance = np.concatenate([[0.0], np.cumsum(moved)])
         cells = np.floor(distance / self.terrain.resolution)

@@ -95,6 +95,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), joints)
         hear(Imu, "imu", self._take_imu, polled_qos())
         hear(Odometry, "odometry", self._take_odometry, polled_qos())
+        # By ROS time: where /clock runs fast, more comes in a steady time than queues hold.
         self.loop = self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(self, PointCloud2, CLOUD, self._take_map)
         self.follow_changes(lambda _: None, lambda _: None)

@@ -24,7 +24,7 @@ from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
-from rover_planner.traction.traction_service import TractionService
+from rover_planner.traction.supervisor import TractionSupervisor
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 
@@ -92,7 +92,8 @@ def control_traction() -> None:
 
 def update_traction(settings: TractionSettings) -> None:
     """Run all that an update of the traction controller runs, on level ground."""
-    service = TractionService(settings)
+    supervisor = TractionSupervisor(settings, enabled=True)
+    service = supervisor.service
     joints = dict.fromkeys(JOINTS, 0.0)
     service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
     for now in (0.0, 0.01):
@@ -100,7 +101,8 @@ def update_traction(settings: TractionSettings) -> None:
         service.take_attitude(0.0, 0.0, np.zeros(3), now)
         service.take_command(0.01, 0.0, now)
         service.take_odometry(np.zeros(4), 0.0, now)
-        service.update(now)
+        service.take_stop(False, now)
+        supervisor.update(now)
 
 
 PATH_SEARCH = (search_paths,)

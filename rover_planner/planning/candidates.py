@@ -14,8 +14,8 @@ ahead and turn again, if this is shorter than all curves.
 import numpy as np
 
 from rover_physics.numerics.interruption import check_interruption
+from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
-from rover_planner.planning.angles import wrap
 from rover_planner.planning.dubins import count_steps, dubins_paths
 
 MIN_RADIUS = 0.8

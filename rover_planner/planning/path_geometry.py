@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import MAX_WAYPOINTS
 
@@ -37,7 +38,7 @@ def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
         PlanningError: The path would have more than MAX_WAYPOINTS.
     """
     steps = np.diff(poses, axis=0)
-    steps[:, 2] = np.arctan2(np.sin(steps[:, 2]), np.cos(steps[:, 2]))
+    steps[:, 2] = wrap(steps[:, 2])
     counts = _count_pieces(steps, spacing)
     segment = np.repeat(np.arange(len(steps)), counts)
     within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)

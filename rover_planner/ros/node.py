@@ -42,7 +42,7 @@ class RoverNode(Node, Generic[Table]):
         self.heard = PolledTopics(self, self.guard)
         """Topics that are read when the node needs what they say."""
         self.loop: Timer | None = None
-        """Timer of what the node does all the time, for its executor; a steady one."""
+        """Timer of what the node does all the time, for its executor; steady, or by ROS time."""
         self.urgent_threads: tuple[int, ...] = ()
         """Ids of the threads that take the real-time priority; empty for all of the process."""
 

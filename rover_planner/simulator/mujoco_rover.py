@@ -150,6 +150,7 @@ class MujocoRover:
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with speed servos."""
+        speed, yaw_rate = self._drive.clip(speed, yaw_rate)
         if self.rover.steering is None:
             speeds = speed + yaw_rate * self._arms
         else:

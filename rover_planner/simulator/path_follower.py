@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.path_geometry import distance_along
 
 ARRIVED = 0.02

@@ -110,6 +110,7 @@ class QuasiStaticPlant:
         Wheels that steer turn at their largest rate, and the rover drives slower or stands until
         they point along the motion.
         """
+        speed, yaw_rate = self._drive.clip(speed, yaw_rate)
         if self._repeats("drive", speed, yaw_rate):
             return
         self._torques = self._here.torque[0].copy()
@@ -146,6 +147,7 @@ class QuasiStaticPlant:
 
     def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
         """Apply torques (6,) [N m] for a duration [s]; speed and yaw rate set the steering."""
+        command = self._drive.clip(*command)
         if self._repeats("pull", *torques.tolist(), *command):
             self._watch_stall(duration)
             return

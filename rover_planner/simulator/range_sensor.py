@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
+from rover_planner.angles import wrap
 from rover_planner.parameters.rover_simulator import ALL_AROUND, RoverSimulatorParameters
 
 RAYS = 1440
@@ -43,7 +44,7 @@ def look(
     bearing = np.arctan2(dy, dx)
     seen = (away <= asked.sensor_range) & (away >= asked.sensor_least_range)
     if asked.sensor_field_of_view < ALL_AROUND:
-        aside = np.abs((bearing - yaw + np.pi) % (2.0 * np.pi) - np.pi)
+        aside = np.abs(wrap(bearing - yaw))
         seen &= aside <= 0.5 * asked.sensor_field_of_view
     if asked.sensor_occlusion:
         seen &= _find_visible(asked, terrain, position, heights, away, bearing)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Limits of what a rover can measure and do: impossible measurements, commands that are too fast.
+"""Limits of what a rover can measure.
 
 A measurement outside these limits comes from a broken sensor or driver, not from a rover.
 """
@@ -7,12 +7,9 @@ A measurement outside these limits comes from a broken sensor or driver, not fro
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
-from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steering_joints
 
 MAX_WHEEL_RATE_RATIO = 20.0
@@ -40,8 +37,6 @@ class MeasurementLimits:
         if rover.steering is not None:
             limit = rover.steering.limit
             self._angles |= dict.fromkeys(steering_joints(rover), (-limit, limit))
-        self._max_speed = wheel.max_speed * wheel.radius
-        self._drive = SteeredDrive(rover)
 
     def find_wrong_joint(
         self, positions: Mapping[str, float], velocities: Mapping[str, float]
@@ -68,14 +63,3 @@ class MeasurementLimits:
             f"imu has angular velocity {rates.tolist()}; it must be within "
             f"{MAX_TURNING_RATE:g} rad/s"
         )
-
-    def clip_command(self, speed: float, yaw_rate: float) -> tuple[float, float]:
-        """Return a speed [m/s] and yaw rate [rad/s] at which no wheel exceeds its largest speed.
-
-        Both are scaled by the same factor, so that the curvature stays.
-        """
-        if speed == yaw_rate == 0.0:
-            return 0.0, 0.0
-        fastest = float(np.abs(self._drive.aim(speed, yaw_rate).speeds).max())
-        share = self._max_speed / max(fastest, self._max_speed)
-        return share * speed, share * yaw_rate

@@ -11,6 +11,7 @@ import numpy as np
 from rover_physics.errors import ModelError
 from rover_physics.names import OPTIMAL, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceRows, BalanceWriter, MeasuredState
@@ -150,7 +151,7 @@ class TractionService:
         } | {STOP: parameters.stop_timeout or math.inf}
         self.monitor.tolerance = parameters.stamp_tolerance
         self._writer = BalanceWriter(rover, settings.payload)
-        self._limits = MeasurementLimits(rover)
+        self._limits, self._drive = MeasurementLimits(rover), SteeredDrive(rover)
         self._optimal = parameters.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
         self._inputs = ProgramInputs(friction, settings.max_torque, rover.wheel.radius)
@@ -239,7 +240,7 @@ class TractionService:
 
         Speeds beyond those of the rover's wheels are reduced.
         """
-        self.wanted = self._limits.clip_command(speed, yaw_rate)
+        self.wanted = self._drive.clip(speed, yaw_rate)
         self.monitor.take(CMD_VEL, now)
 
     def take_stop(self, stops: bool, now: float) -> None:
@@ -278,11 +279,6 @@ class TractionService:
     def start_from(self, torques: Floats) -> None:
         """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
         self._torques = torques.copy()
-
-    def update(self, now: float) -> TractionCommand:
-        """Return the command for time `now` [s], on the same clock as the inputs."""
-        fault = self.find_fault(now)
-        return self.rest(fault) if fault else self.drive(now)
 
     def drive(self, now: float) -> TractionCommand:
         """Return the command for time `now` [s], at which the inputs have no fault."""

@@ -13,7 +13,7 @@ from rover_physics import SweepOptions, judge_path
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
-from rover_planner.advice.case import Case
+from rover_planner.advice.case import SEARCH, Case
 from rover_planner.advice.levers import LEVERS, Choice
 from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.seek import TOLERANCE
@@ -211,7 +211,10 @@ def test_a_path_that_mostly_turns_on_the_spot_is_driven_backward():
 
 
 @pytest.mark.parametrize("size", [0.25, 2.0])
-def test_the_way_around_passes_and_is_as_long_for_the_size_of_the_rover(size):
+def test_the_way_around_passes_and_is_as_long_for_the_size_of_the_rover(size, monkeypatch):
+    unhurried = replace(SEARCH, budget=30.0)  # a busy machine is slow
+    monkeypatch.setattr("rover_planner.advice.case.SEARCH", unhurried)
+
     def way_around(size: float) -> float:
         ground = enlarged(make_terrain(rock_left, half=3.0), size)
         poses = STRAIGHT * [size, size, 1.0]

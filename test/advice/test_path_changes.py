@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_planner.advice import path_changes
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from support.paths import arc_of
 
 S = np.linspace(0.0, 8.0, 401)

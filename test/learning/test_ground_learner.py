@@ -105,6 +105,16 @@ def test_torques_beyond_what_holds_the_rover_make_a_slip_tell_less_surely():
     assert pushed.high / pushed.low > 1.08 * held.high / held.low
 
 
+def test_loads_that_no_ground_gives_tell_nothing():
+    rows = climb(ROVER, SLOPE, 20.0, speed=0.02)[::5]
+    rows[:, RATES] *= 3.5
+    # Two rear wheels pull back and one bogie pushes: its front wheel would hang on the ground.
+    rows[:, TORQUES] += [-2.0, 2.0, 2.0, -2.0, 0.0, 0.0]
+    learner = learn(rows)
+    assert learner.window.loads[2] < -0.1 * ROVER.weight
+    assert learner.estimate.friction.high is None and learner.estimate.friction.low < 0.1
+
+
 def test_wheels_whose_slip_is_hidden_by_noise_prove_no_friction():
     rows = climb(ROVER, SLOPE, 20.0)[::5]
     rows[rows[:, X] > 0.0, RATES] *= 3.0
@@ -142,6 +152,13 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
+def test_stamps_that_are_not_regular_make_windows_no_longer():
+    rows = climb(ROVER, SLOPE, 12.0)[::5]
+    regular = learn(rows).window
+    rows[:, TIME] += np.random.default_rng(3).uniform(-0.005, 0.005, len(rows))
+    assert learn(rows).window.duration == pytest.approx(regular.duration, abs=0.02)
+
+
 def test_a_drive_after_the_clock_was_set_back_is_learned_as_another_one():
     rows = climb(ROVER, SLOPE, 12.0)[::2]
     again = rows.copy()
@@ -176,6 +193,21 @@ def test_a_bad_sensor_is_told_and_not_believed(sensors, spoil, word):
     assert estimate.faults == {"middle_left": word}
     assert estimate.friction.high is None
     assert estimate.friction.low < 1.2 * SLOPE
+
+
+def test_coarse_rates_whose_last_digit_turns_at_three_wheels_only_are_not_frozen():
+    rows, digit = climb(ROVER, SLOPE, 8.0)[::2], 0.05
+    rates = 0.4 + 0.004 * np.random.default_rng(4).standard_normal((len(rows), 6))
+    rates[:, :3] += 0.5 * digit
+    rows[:, RATES] = digit * np.round(rates / digit)
+    assert not learn(rows).estimate.faults
+
+
+def test_torques_of_a_rover_that_stands_are_not_frozen_because_others_are_missing():
+    rows = climb(ROVER, 0.0, 8.0)[::5]
+    rows[rows[:, TIME] > 4.0, TORQUES] = 0.0
+    rows[:, TORQUES.start : TORQUES.start + 3] = np.nan
+    assert set(learn(rows, ramp(0.0)).estimate.faults.values()) == {"no torque"}
 
 
 def test_torques_that_wheels_apply_to_each_other_on_the_spot_are_no_wrong_signs():

@@ -4,46 +4,13 @@
 import numpy as np
 import pytest
 
-from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.traction.loops import StallWatch
-from rover_planner.traction.settings import load_traction_settings
-from rover_planner.traction.supervisor import RECOVERY_TIME, STANDSTILL_DELAY, TractionSupervisor
-
-PERIOD = 0.02
-INPUTS = ("joint_states", "imu", "cmd_vel")
-ANGLES = dict.fromkeys((*SUSPENSION_JOINTS, *STEERING_JOINTS), 0.0)
-
-
-class Rig:
-    """A supervisor and the measurements of a rover that creeps over level ground."""
-
-    def __init__(self, enabled=True, **values):
-        settings = load_traction_settings(TractionControllerParameters(**values))
-        self.supervisor = TractionSupervisor(settings, enabled)
-        self.now, self.speed, self.pitch, self.rate = 0.0, 0.03, 0.0, 0.2
-        self.commands = []
-
-    def send(self, names):
-        service = self.supervisor.service
-        rates = dict.fromkeys(SUSPENSION_JOINTS, 0.0) | dict.fromkeys(WHEEL_JOINTS, self.rate)
-        if "joint_states" in names:
-            service.take_joints(ANGLES, rates, self.now)
-        if "imu" in names:
-            service.take_attitude(0.0, self.pitch, np.zeros(3), self.now)
-        if "cmd_vel" in names:
-            service.take_command(self.speed, 0.0, self.now)
-
-    def run(self, seconds, *names):
-        for _ in range(round(seconds / PERIOD)):
-            self.now += PERIOD
-            self.send(names or INPUTS)
-            self.commands.append(self.supervisor.update(self.now))
-        return self.commands[-1]
+from rover_planner.traction.supervisor import RECOVERY_TIME, STANDSTILL_DELAY
+from support.creeping_rover import INPUTS, PERIOD, CreepingRover
 
 
 def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_enabling():
-    rig = Rig(enabled=False)
+    rig = CreepingRover(enabled=False)
     supervisor = rig.supervisor
     assert rig.run(1.0).state == "disabled"
     assert supervisor.set_enabled(True) == (True, "enabled")
@@ -60,37 +27,38 @@ def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_ena
 
 
 def test_the_watch_of_the_path_holds_the_rover_and_where_it_is_expected_so_does_its_silence():
-    rig = Rig()
-    service = rig.supervisor.service
+    rig = CreepingRover()
+    service = rig.service
     assert rig.run(1.0).state == "driving"  # nobody told it to expect a watch
     service.take_stop(True, rig.now)
     command = rig.run(PERIOD)
     assert command.state == "fault" and "stop is true" in command.fault
     service.take_stop(False, rig.now)
     assert rig.run(1.0).state == "driving"  # by itself, with the next accepted path
-    rig = Rig(stop_timeout=0.4)
+    rig = CreepingRover(stop_timeout=0.4)
     assert "waiting for traverse_server/stop" in rig.run(1.0).fault
-    rig.supervisor.service.take_stop(False, rig.now)
-    assert rig.run(0.36).state == "driving" and rig.commands[-1].expiry <= rig.now + 0.06
+    rig.service.take_stop(False, rig.now)
+    assert rig.run(0.36).state == "driving" and rig.updates[-1].expiry <= rig.now + 0.06
     command = rig.run(0.08)
     assert command.state == "fault" and "stop stale: none for 400 ms" in command.fault
 
 
 def test_hold_brakes_wheels_that_turn_and_stays_within_the_limit():
-    rig = Rig(max_torque=0.1)
+    rig = CreepingRover(max_torque=0.1)
     rig.run(1.0)
     torques = [rig.run(PERIOD, "joint_states", "imu").torques for _ in range(200)]
-    assert rig.commands[-1].state == "fault" and not rig.commands[-1].brake
+    assert rig.updates[-1].state == "fault" and not rig.updates[-1].brake
     assert max(np.abs(torque).max() for torque in torques) <= 0.1
     assert (torques[-1] == -0.1).all()
-    rig.rate = -0.2
+    rig.turn_wheels(-0.2)
     assert (rig.run(1.0, "joint_states").torques > -0.1).all()
 
 
 def test_hold_starts_from_the_torques_that_balance_the_weight_on_a_slope():
-    rig = Rig(enabled=False)
-    rig.rate, rig.pitch = 0.0, np.radians(20.0)
-    rover = rig.supervisor.service.settings.rover
+    rig = CreepingRover(enabled=False)
+    rig.turn_wheels(0.0)
+    rig.pitch = np.radians(20.0)
+    rover = rig.service.settings.rover
     wanted = -rover.weight * np.sin(rig.pitch) * rover.wheel.radius
     assert rig.run(0.1).torques.sum() == pytest.approx(wanted)
 
@@ -100,7 +68,7 @@ def test_hold_starts_from_the_torques_that_balance_the_weight_on_a_slope():
     [("hold", "joint_states", True), ("brake", "imu", True), ("coast", "imu", False)],
 )
 def test_brake_coast_and_hold_without_wheel_rates_give_no_torque(policy, lost, brake):
-    rig = Rig(rest_policy=policy)
+    rig = CreepingRover(rest_policy=policy)
     assert not rig.run(1.0).brake
     command = rig.run(0.1, *(name for name in INPUTS if name != lost))
     assert command.state == "fault" and command.fault.startswith(f"{lost} stale")
@@ -109,59 +77,70 @@ def test_brake_coast_and_hold_without_wheel_rates_give_no_torque(policy, lost, b
 
 
 def test_driving_goes_on_from_the_torques_of_rest():
-    rig = Rig(torque_rate=1.0)
-    rig.rate, rig.pitch = 0.0, -np.radians(20.0)
-    rig.speed = 0.0
+    rig = CreepingRover(torque_rate=1.0)
+    rig.turn_wheels(0.0)
+    rig.pitch = -np.radians(20.0)
+    rig.command = (0.0, 0.0)
     held = rig.run(1.0).torques
-    rig.speed = 0.03
+    rig.command = (0.03, 0.0)
     first = rig.run(PERIOD)
     assert first.state == "driving" and np.abs(first.torques - held).max() <= 1.0 * PERIOD + 1e-9
     assert first.torques.sum() > 0.8 * held.sum()
 
 
 def test_an_input_that_is_bad_every_other_time_is_one_fault():
-    rig = Rig()
+    rig = CreepingRover()
     rig.run(1.0)
-    rig.commands.clear()
+    rig.updates.clear()
     for k in range(100):
         if k % 2:
-            rig.supervisor.service.monitor.refuse("imu", "imu is nan", rig.now + PERIOD)
+            rig.service.monitor.refuse("imu", "imu is nan", rig.now + PERIOD)
             rig.run(PERIOD, "joint_states", "cmd_vel")
         else:
             rig.run(PERIOD)
-    assert [command.state for command in rig.commands] == ["driving"] + 99 * ["fault"]
+    assert [command.state for command in rig.updates] == ["driving"] + 99 * ["fault"]
     assert rig.run(RECOVERY_TIME + 0.1).state == "driving"
 
 
 def test_a_fault_found_elsewhere_counts_from_the_next_update_on():
-    rig = Rig()
+    rig = CreepingRover()
     rig.run(1.0)
     rig.supervisor.trip("updates came too late")
     assert rig.run(RECOVERY_TIME - PERIOD).fault == "updates came too late"
     assert rig.run(1.0).state == "driving"
+    command = rig.supervisor.fail("an error")
+    assert command.brake and not command.torques.any() and rig.run(PERIOD).fault == "an error"
 
 
 def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_otherwise():
-    rig = Rig(stall_time=2.0)
-    rig.rate = 0.0
+    rig = CreepingRover(stall_time=2.0)
+    rig.turn_wheels(0.0)
     assert rig.run(1.9).state == "driving"
-    pushed = np.abs(rig.commands[-1].torques).sum()
+    pushed = np.abs(rig.updates[-1].torques).sum()
     command = rig.run(0.2)
     assert command.state == "stalled" and np.abs(command.torques).sum() < 0.01 * pushed
     assert rig.run(5.0).state == "stalled"
-    rig.speed = -0.03
+    rig.command = (-0.03, 0.0)
     assert rig.run(PERIOD).state == "driving"
-    rig.speed = 0.03
+    rig.command = (0.03, 0.0)
     assert rig.run(2.2).state == "stalled"
-    rig.speed = 0.0
+    rig.command = (0.0, 0.0)
     assert rig.run(STANDSTILL_DELAY - 0.1).state == "driving"
     assert rig.run(0.2).state == "standstill"
-    rig.speed = 0.03
+    rig.command = (0.03, 0.0)
     assert rig.run(1.0).state == "driving"
     rig.run(2.0)
     for enabled in (False, True):
         rig.supervisor.set_enabled(enabled)
         assert rig.run(PERIOD).state == ("driving" if enabled else "disabled")
+
+
+def test_a_rover_that_climbs_slowly_is_not_stalled():
+    rig = CreepingRover(stall_time=2.0)
+    rig.turn_wheels(0.0)
+    for _ in range(150):
+        rig.positions["bogie_left"] += 0.002
+        assert rig.run(PERIOD).state == "driving"
 
 
 @pytest.mark.parametrize("wanted", [(-0.3, 0.3), (0.3, 0.0)])

@@ -6,35 +6,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
-from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.parameters.traction_controller import COAST, TractionControllerParameters
 from rover_planner.traction.settings import load_traction_settings
-from rover_planner.traction.traction_service import TractionService
+from rover_planner.traction.supervisor import RECOVERY_TIME
+from support.creeping_rover import PERIOD, CreepingRover
 from support.rough_grounds import plane
 from support.rovers import FIXED, LSR1
 
 STEERED = steering_joints(LSR1)
-STANDING = dict.fromkeys(WHEEL_JOINTS, 0.0)
-PERIOD = 0.02
+AGAIN = RECOVERY_TIME + 3 * PERIOD
+"""Time after which it drives again once all is right [s]."""
 
 
-def settings(**values):
-    return load_traction_settings(TractionControllerParameters(**values))
-
-
-class Rig:
-    """A service and the measurements of a rover that creeps over level ground."""
+class Rig(CreepingRover):
+    """A rover without torques at rest."""
 
     def __init__(self, command=(0.03, 0.0), **values):
-        self.service, self.command = TractionService(settings(**values)), command
-        self.now = 0.0
-        self.positions = dict.fromkeys((*SUSPENSION_JOINTS, *STEERING_JOINTS), 0.0)
-        self.velocities = dict.fromkeys((*SUSPENSION_JOINTS, *WHEEL_JOINTS), 0.0)
-        self.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.2)
-        self.pitch = 0.0
-        self.rates = np.zeros(3)
+        super().__init__(command, rest_policy=COAST, **values)
 
     def roll(self, share):
         """Turn the wheels for the command, and let them roll at a share of what it asks."""
@@ -45,31 +36,15 @@ class Rig:
         self.rates = np.array([0.0, 0.0, share * self.command[1]])
         return rates
 
-    def send(self, *names):
-        for name in names or ("joint_states", "imu", "cmd_vel"):
-            if name == "joint_states":
-                self.service.take_joints(self.positions, self.velocities, self.now)
-            elif name == "imu":
-                self.service.take_attitude(0.0, self.pitch, self.rates, self.now)
-            else:
-                self.service.take_command(*self.command, self.now)
-
-    def run(self, count=30, *names):
-        for _ in range(count):
-            self.now += PERIOD
-            self.send(*names)
-            update = self.service.update(self.now)
-        return update
-
 
 @pytest.mark.parametrize("silent", ["joint_states", "imu", "cmd_vel"])
 def test_a_silent_input_stops_the_wheels_after_its_timeout_and_its_return_starts_them(silent):
     rig = Rig()
-    assert rig.run().torques.any()
+    assert rig.run(0.6).torques.any()
     others = [name for name in ("joint_states", "imu", "cmd_vel") if name != silent]
-    update = rig.run(26 if silent == "cmd_vel" else 4, *others)
+    update = rig.run(0.52 if silent == "cmd_vel" else 0.08, *others)
     assert not update.torques.any() and update.fault.startswith(f"{silent} stale")
-    update = rig.run(3)
+    update = rig.run(AGAIN)
     assert update.fault == "" and update.torques.any()
 
 
@@ -82,35 +57,35 @@ def test_a_silent_input_stops_the_wheels_after_its_timeout_and_its_return_starts
 )
 def test_a_missing_joint_stops_the_wheels_within_a_tenth_of_a_second(values, kind, name):
     rig = Rig()
-    rig.run()
+    rig.run(0.6)
     value = getattr(rig, values).pop(name)
-    assert rig.run(1).fault == ""
-    update = rig.run(4)
+    assert rig.run(PERIOD).fault == ""
+    update = rig.run(0.08)
     assert not update.torques.any()
     assert update.fault == f"joint_states stale: none for 60 ms (no {kind} of {name})"
     getattr(rig, values)[name] = value
-    assert rig.run(2).fault == ""
+    assert rig.run(AGAIN).fault == ""
 
 
 def test_what_the_loops_added_up_is_forgotten_in_a_fault():
     rig = Rig()
-    rig.velocities |= STANDING
-    wound = np.abs(rig.run(60).torques).max()
+    rig.turn_wheels(0.0)
+    wound = np.abs(rig.run(1.2).torques).max()
     rig.now += 1.0
-    assert not rig.service.update(rig.now).torques.any()
-    assert np.abs(rig.run(3).torques).max() < 0.5 * wound
+    assert not rig.supervisor.update(rig.now).torques.any()
+    assert np.abs(rig.run(AGAIN).torques).max() < 0.5 * wound
 
 
 def test_the_source_of_contact_angles_is_the_best_there_is():
     rig = Rig()
-    assert rig.run().estimate.source == "motion"
+    assert rig.run(0.6).estimate.source == "motion"
     rig.service.take_terrain(plane(0.0, 0.0, half=2.0))
     rig.service.take_odometry(np.array([0.0, 0.0, 0.3, 0.0]), 0.01, rig.now)
-    assert rig.run(1).estimate.source == "map"
+    assert rig.run(PERIOD).estimate.source == "map"
     rig.now += 1.0
-    assert rig.run(2).estimate.source == "motion"
+    assert rig.run(0.04).estimate.source == "motion"
     rig.rates = None
-    update = rig.run(2)
+    update = rig.run(0.04)
     assert update.estimate.source == "zero" and "angular velocity" in update.warning
     assert update.torques.any()
 
@@ -125,14 +100,14 @@ def test_the_source_of_contact_angles_is_the_best_there_is():
 )
 def test_an_impossible_measurement_is_a_fault_that_names_it(kind, name, value, text):
     rig = Rig()
-    rig.run()
+    rig.run(0.6)
     getattr(rig, kind)[name] = value
-    update = rig.run(1)
+    update = rig.run(PERIOD)
     assert text in update.fault and not update.torques.any()
 
 
 def test_commands_are_reduced_to_what_the_wheels_can_do():
-    service = TractionService(settings())
+    service = Rig().service
     service.take_command(5.0, 0.0, 0.0)
     assert service.wanted == pytest.approx((0.1, 0.0))
     service.take_command(-0.1, 1.0, 0.0)
@@ -151,12 +126,12 @@ def test_no_change_of_a_parameter_moves_a_torque_faster_than_torque_rate(change)
     rig = Rig()
     rig.pitch = -0.2
     rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.1) | {"rear_left_wheel": 0.4}
-    last = rig.run().torques
+    last = rig.run(0.6).torques
     assert np.abs(last).max() > 0.2
     parameters = TractionControllerParameters(**change)
-    rig.service.settings = load_traction_settings(parameters, rig.service.settings)
+    rig.supervisor.configure(load_traction_settings(parameters, rig.service.settings))
     for _ in range(20):
-        torques = rig.run(1).torques
+        torques = rig.run(PERIOD).torques
         most = rig.service.settings.torque_rate * PERIOD
         assert np.abs(torques - last).max() <= most + 1e-9
         last = torques
@@ -169,9 +144,29 @@ def test_it_pushes_up_a_slope_with_the_weight_along_it_within_a_third_of_a_secon
     rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.03 / 0.2625)
     rover = rig.service.settings.rover
     wanted = rover.weight * np.sin(-rig.pitch) * rover.wheel.radius
-    while rig.run(1).torques.sum() < 0.9 * wanted:
+    while rig.run(PERIOD).torques.sum() < 0.9 * wanted:
         assert rig.now < 0.33
-    assert rig.run(60).torques.sum() == pytest.approx(wanted, rel=0.01)
+    update = rig.run(1.2)
+    assert update.torques.sum() == pytest.approx(wanted, rel=0.01)
+    assert update.answer.loads[0] > 1.2 * update.answer.loads[2]  # rear and front
+
+
+def test_torques_that_are_no_numbers_are_a_fault(monkeypatch):
+    rig = Rig()
+    answer = replace(rig.run(0.6).answer, torques=np.full(6, np.nan))
+    monkeypatch.setattr(rig.service, "_share_torques", lambda rows: answer)
+    update = rig.run(PERIOD)
+    assert "must be finite" in update.fault and not update.torques.any()
+
+
+def test_wheels_that_spin_are_slowed_and_do_not_hide_that_the_others_stand():
+    rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
+    rig.turn_wheels(0.0)
+    rig.velocities |= dict.fromkeys(("front_right_wheel", "front_left_wheel"), 1.0)
+    before, after = rig.run(0.2).torques, rig.run(4.0).torques
+    assert before[2] < 0.0 < before[0]
+    assert after[0] > 2.0 * before[0]
+    assert np.abs(after).max() == LSR1.wheel.max_torque
 
 
 # Wheels that steer
@@ -179,15 +174,16 @@ def test_it_pushes_up_a_slope_with_the_weight_along_it_within_a_third_of_a_secon
 
 def test_a_rover_with_steering_asks_for_its_joints_and_guesses_nothing():
     rig = Rig()
-    rig.service = TractionService(replace(settings(), rover=FIXED))
+    steered = rig.service.settings
+    rig.supervisor.configure(replace(steered, rover=FIXED))
     known = {name: rig.positions.pop(name) for name in STEERED}
-    assert rig.run(5).fault == ""
-    rig.service.settings = settings()
-    update = rig.run(1)
+    assert rig.run(0.1).fault == ""
+    rig.supervisor.configure(steered)
+    update = rig.run(PERIOD)
     assert not update.torques.any()
     assert update.fault == f"waiting for joint_states (no position of {', '.join(STEERED)})"
     rig.positions |= known
-    assert rig.run(2).fault == ""
+    assert rig.run(AGAIN).fault == ""
 
 
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
@@ -195,9 +191,9 @@ def test_a_rover_that_is_too_slow_is_pushed_along_its_curve(policy):
     for command in ((0.03, 0.03), (0.0, -0.05), (-0.03, 0.02)):
         rig = Rig(command, policy=policy)
         wanted = np.sign(rig.roll(1.0))
-        assert np.abs(rig.run(100).torques).max() < 1e-3, command  # it rolls as wanted
+        assert np.abs(rig.run(2.0).torques).max() < 1e-3, command  # it rolls as wanted
         rig.roll(0.5)
-        torques = rig.run(50).torques
+        torques = rig.run(1.0).torques
         assert (wanted * torques > 1e-3).all(), (command, torques)
 
 
@@ -205,21 +201,21 @@ def test_a_rover_that_turns_unasked_is_turned_back():
     rig = Rig()
     rig.roll(1.0)
     rig.rates = np.array([0.0, 0.0, 0.05])  # to the left
-    right, left = np.split(rig.run(30).torques, 2)
+    right, left = np.split(rig.run(0.6).torques, 2)
     assert right.max() < -1e-3 and left.min() > 1e-3
 
 
 def test_straight_wheels_do_not_push_a_rover_that_is_to_turn_on_the_spot():
     rig = Rig((0.0, 0.1))
-    rig.velocities |= STANDING
-    update = rig.run(50)
+    rig.turn_wheels(0.0)
+    update = rig.run(1.0)
     assert update.fault == "" and np.abs(update.torques).max() < 1e-6
     assert not rig.service.wanted_rates.any()
 
 
 def test_a_command_beyond_the_steering_limit_is_named_and_not_driven():
     rig, narrow = Rig((0.0, 0.1)), replace(LSR1, steering=replace(LSR1.steering, limit=0.4))
-    rig.service = TractionService(replace(settings(), rover=narrow))
-    rig.velocities |= STANDING
-    update = rig.run(5)
+    rig.supervisor.configure(replace(rig.service.settings, rover=narrow))
+    rig.turn_wheels(0.0)
+    update = rig.run(0.1)
     assert "steering angle of" in update.warning and not update.torques.any()

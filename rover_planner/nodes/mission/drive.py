@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_planner.angles import wrap
 from rover_planner.nodes.mission.errors import DriveFailedError
-from rover_planner.planning.angles import wrap
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
 

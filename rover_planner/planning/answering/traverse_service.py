@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The traverse server without ROS: keeps map, path and measurements, and answers queries."""
 
-import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NamedTuple
 
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain, fingerprint
 from rover_physics.terrain.ground import pack_ground
 from rover_planner.maps.ground_beneath import Standing
@@ -27,10 +25,17 @@ MAX_AGE = 1.0
 """Age up to which a measurement counts as one of now [s]."""
 
 
+class Measured(NamedTuple):
+    """What was measured, and when [s]."""
+
+    value: Any
+    time: float
+
+
 class TraverseService:
     """Keeps the last valid map, path and measurements, and answers queries about them.
 
-    Maps may be taken in another thread than the rest.
+    Maps may be taken in another thread than the rest, all in the same one.
     """
 
     def __init__(self, settings: ServiceSettings, clock: Callable[[], float] = time.monotonic):
@@ -44,17 +49,13 @@ class TraverseService:
         """The last path, or the reason why it was refused."""
         self.marked = NONE_MARKED
         """Places that are impassable, for new questions."""
-        self._map_lock = threading.Lock()
         self._edge_memory = EdgeMemory()
         self._ground: LearnedGround | None = None
         self._assumed: tuple[ServiceSettings, LearnedGround | None, ServiceSettings] | None = None
         self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
-        self._joints: dict[str, float] = {}
-        self._joint_times: dict[str, float] = {}
-        self._pose: NDArray[np.float64] | None = None
-        self._pose_time = -np.inf
-        self._tilt: tuple[float, float] | None = None
-        self._tilt_time = -np.inf
+        self._joints: dict[str, Measured] = {}
+        self._pose: Measured | None = None
+        self._tilt: Measured | None = None
 
     @property
     def terrain(self) -> Terrain | None:
@@ -64,49 +65,54 @@ class TraverseService:
     @property
     def joints(self) -> dict[str, float]:
         """Measured angles [rad] by name, of any age."""
-        return dict(self._joints)
+        return {name: angle.value for name, angle in self._joints.items()}
 
     def take_joints(self, positions: Mapping[str, float]) -> None:
         """Keep measured joint angles [rad] by name; angles of other joints stay."""
-        self._joints.update(positions)
-        self._joint_times.update(dict.fromkeys(positions, self._clock()))
+        now = self._clock()
+        # A new mapping: another thread may read the last one.
+        self._joints = self._joints | {name: Measured(at, now) for name, at in positions.items()}
 
-    def take_pose(self, pose: NDArray[np.float64]) -> None:
+    def take_pose(self, pose: Floats) -> None:
         """Keep the measured x, y, z [m], roll, pitch, yaw [rad] (6,) of the body, map frame."""
-        self._pose, self._pose_time = pose, self._clock()
+        self._pose = Measured(pose, self._clock())
 
     def take_tilt(self, roll: float, pitch: float) -> None:
         """Keep roll and pitch [rad] of the body, measured by an IMU."""
-        self._tilt, self._tilt_time = (roll, pitch), self._clock()
+        self._tilt = Measured((roll, pitch), self._clock())
+
+    def _is_recent(self, *measured: Measured, max_age: float = MAX_AGE) -> bool:
+        """Return whether no measurement is older than `max_age` [s]."""
+        return self._clock() - min(one.time for one in measured) <= max_age
 
     def standing(self) -> Standing | None:
         """Return pose and suspension if all of them are not older than MAX_AGE, else None.
 
         Roll and pitch are those of the IMU if there ever was one, else those of the pose.
         """
-        now = self._clock()
-        times = [self._joint_times.get(name, -np.inf) for name in SUSPENSION_JOINTS]
-        if self._pose is None or now - min(*times, self._pose_time) > MAX_AGE:
+        pose, tilt, joints = self._pose, self._tilt, self._joints
+        if pose is None or not joints.keys() >= set(SUSPENSION_JOINTS):
             return None
-        x, y, z, roll, pitch, yaw = self._pose.tolist()
-        if self._tilt is not None:
-            if now - self._tilt_time > MAX_AGE:
-                return None
-            roll, pitch = self._tilt
-        suspension = {name: self._joints[name] for name in SUSPENSION_JOINTS}
-        return Standing(x, y, z, roll, pitch, yaw, suspension)
+        suspension = {name: joints[name] for name in SUSPENSION_JOINTS}
+        if not self._is_recent(pose, tilt or pose, *suspension.values()):
+            return None
+        x, y, z, roll, pitch, yaw = pose.value.tolist()
+        if tilt is not None:
+            roll, pitch = tilt.value
+        angles = {name: angle.value for name, angle in suspension.items()}
+        return Standing(x, y, z, roll, pitch, yaw, angles)
 
-    def fresh_pose(self, max_age: float = MAX_AGE) -> NDArray[np.float64] | None:
+    def fresh_pose(self, max_age: float = MAX_AGE) -> Floats | None:
         """Return the pose (3,) x, y [m], yaw [rad] if it is not older than `max_age` [s]."""
-        if self._pose is None or self._clock() - self._pose_time > max_age:
+        pose = self._pose
+        if pose is None or not self._is_recent(pose, max_age=max_age):
             return None
-        return self._pose[[0, 1, 5]]
+        return pose.value[[0, 1, 5]]
 
-    def pose_with_suspension(self) -> NDArray[np.float64] | None:
+    def pose_with_suspension(self) -> Floats | None:
         """Return the pose (3,) if it and the suspension's angles are not older than MAX_AGE."""
-        times = [at for name, at in self._joint_times.items() if name in SUSPENSION_JOINTS]
-        is_fresh = bool(times) and self._clock() - min(times) <= MAX_AGE
-        return self.fresh_pose() if is_fresh else None
+        angles = [at for name, at in self._joints.items() if name in SUSPENSION_JOINTS]
+        return self.fresh_pose() if angles and self._is_recent(*angles) else None
 
     def take_terrain(
         self,
@@ -230,11 +236,10 @@ class TraverseService:
 
         `prepare` makes the first question about it fast.
         """
-        with self._map_lock:
-            received, gap = about.received, self.settings.largest_gap
-            terrain = received.fill_gaps(gap) if gap > 0.0 else received
-            forget_terrains()
-            before = self.known_map
-            content = fingerprint(received)
-            self.known_map = replace(about, terrain=terrain, fingerprint=content)
-            return before is None or before.fingerprint != content
+        received, gap = about.received, self.settings.largest_gap
+        terrain = received.fill_gaps(gap) if gap > 0.0 else received
+        forget_terrains()
+        before = self.known_map
+        content = fingerprint(received)
+        self.known_map = replace(about, terrain=terrain, fingerprint=content)
+        return before is None or before.fingerprint != content

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.path_geometry import distance_along
 
 USUAL_RADIUS = 0.1

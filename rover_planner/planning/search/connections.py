@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.candidates import turn_and_drive
 from rover_planner.planning.dubins import dubins_lengths, shortest_dubins_path
 from rover_planner.planning.path_query import Pose

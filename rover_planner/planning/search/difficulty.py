@@ -18,6 +18,7 @@ from scipy import ndimage
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.angles import wrap
 from rover_planner.planning.search.ground_estimate import wheel_places
 from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
 from rover_planner.planning.search.primitives import Primitive
@@ -184,7 +185,7 @@ def _sample(poses: NDArray[np.float64], length: float, spacing: float) -> NDArra
     """Return places (n, 3), x, y [m] and heading, along the poses of a primitive."""
     count = 2 + int(length / spacing)
     places = poses[np.rint(np.linspace(0, len(poses) - 1, count)).astype(int)]
-    turned = np.abs(np.angle(np.exp(1j * (places[:, 2:] - YAWS))))
+    turned = np.abs(wrap(places[:, 2:] - YAWS))
     return np.column_stack([places[:, :2], np.argmin(turned, axis=1)])
 
 

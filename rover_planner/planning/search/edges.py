@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.search.difficulty import SAMPLE_SHARE, sample_primitives
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, Primitive

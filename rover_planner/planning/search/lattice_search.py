@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.interruption import check_interruption
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.connections import Connection
 from rover_planner.planning.search.difficulty import Difficulty, difficulty_of

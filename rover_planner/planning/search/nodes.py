@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 
 HEADINGS = 16
 """Number of headings; the first points along x, the others follow to the left."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
-from rover_planner.planning.angles import wrap
+from rover_planner.angles import wrap
 from rover_planner.planning.candidates import turn_on_the_spot
 from rover_planner.planning.dubins import count_steps, drive_word
 from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.names import SIDES
 from rover_physics.results.path_prediction import PathPrediction
+from rover_planner.angles import wrap
 
 STEP = 0.05
 """Distance between recorded poses [m]; what lies between counts as noise of odometry."""
@@ -60,7 +61,7 @@ class RecordedDrive:
         """Add a pose (3,) if the rover has moved."""
         if self.poses:
             step = float(np.hypot(*(pose[:2] - self.poses[-1][:2])))
-            turn = (pose[2] - self.poses[-1][2] + np.pi) % (2.0 * np.pi) - np.pi
+            turn = wrap(pose[2] - self.poses[-1][2])
             if step < STEP and abs(turn) < TURN:
                 return
             self.length += step
@@ -84,6 +85,6 @@ class RecordedDrive:
 def _progress(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how far along a drive each pose is: distance [m], a turn of 1 rad as STEP / TURN."""
     steps = np.diff(poses[:, :2], axis=0)
-    turns = (np.diff(poses[:, 2]) + np.pi) % (2.0 * np.pi) - np.pi
+    turns = wrap(np.diff(poses[:, 2]))
     moved = np.hypot(steps[:, 0], steps[:, 1]) + STEP / TURN * np.abs(turns)
     return np.concatenate([[0.0], np.cumsum(moved)])

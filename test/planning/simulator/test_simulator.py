@@ -9,9 +9,9 @@ import pytest
 from rover_physics import SweepOptions, judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.traction.balance import BalanceWriter
+from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.planning.angles import wrap
 from rover_planner.simulator import range_sensor
 from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_rover import MujocoRover
@@ -81,6 +81,16 @@ def test_no_wheel_turns_faster_than_its_motor_where_it_drops_off_an_edge():
     assert plant.pose()[0] > 0.3
     assert np.abs(rates).max() == pytest.approx(LSR1.wheel.max_speed)
     assert np.diff(spins, axis=0) == pytest.approx(STEP * np.array(rates))
+
+
+@ENGINES
+def test_a_command_beyond_the_motors_is_driven_at_their_speed_on_its_curve(engine):
+    plant, duration = engine(LSR1, LEVEL, (0.0, 0.0, 0.0)), 6.0
+    drive(plant, duration, 1.0, 1.0)
+    x, y, yaw = plant.pose()
+    fastest = LSR1.wheel.max_speed * LSR1.wheel.radius / np.hypot(1.31, 0.4)  # front right wheel
+    assert 0.5 * fastest < yaw / duration < fastest
+    assert (x, y) == pytest.approx((np.sin(yaw), 1.0 - np.cos(yaw)), abs=0.02)
 
 
 def test_it_stops_before_a_wall_and_says_why_and_can_go_back():

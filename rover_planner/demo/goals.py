@@ -11,6 +11,7 @@ from scipy import ndimage
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import grid_of
 
@@ -222,7 +223,7 @@ def _score_cells(ground: _Ground, start: Pose) -> Iterator[tuple[str, NDArray[np
     x, y = ground.places(np.arange(ny)[:, None], np.arange(nx))
     dx, dy = x - start[0], y - start[1]
     distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
-    turn = np.abs(np.angle(np.exp(1j * (bearing - start[2]))))
+    turn = np.abs(wrap(bearing - start[2]))
     ahead, known = 1 - turn / (2 * np.pi), np.isfinite(ground.slope)
     bearings = np.linspace(-np.pi, np.pi, _VIEWS)
     sight = _sight(ground, known, np.array([start]), bearings)[0]
@@ -255,7 +256,7 @@ def _choose_off_map(ground: _Ground, start: Pose) -> Pose:
 def _facing(start: Pose, x: float, y: float) -> Pose:
     """Return a pose at x, y [m] with the end heading of a gentle curve from the start."""
     bearing = np.arctan2(y - start[1], x - start[0])
-    turn = float(np.angle(np.exp(1j * (bearing - start[2]))))
+    turn = float(wrap(bearing - start[2]))
     return (float(x), float(y), float(bearing + (0.5 * turn if abs(turn) < _WIDE_CONE else 0.0)))
 
 

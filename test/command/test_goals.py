@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rover_physics import Terrain, load_terrain
+from rover_planner.demo.goals import choose_mission, footprint_radius
 from rover_planner.errors import PlanningError
-from rover_planner.planning.goals import choose_mission, footprint_radius
 from support.rovers import LSR1
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.demo.goals import Goal
 from rover_planner.figures.pictures import (
     INK,
     PASSABLE,
@@ -26,7 +27,6 @@ from rover_planner.figures.pictures import (
     outlined,
 )
 from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
-from rover_planner.planning.goals import Goal
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
