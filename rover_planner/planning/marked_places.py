@@ -36,6 +36,21 @@ class MarkedPlace:
     date: str
     """When this was found."""
 
+    def away(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distances (n,) of poses (n, 3) from the centre [m]."""
+        return np.hypot(poses[:, 0] - self.x, poses[:, 1] - self.y)
+
+    def is_entered(
+        self, before: NDArray[np.float64], after: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Return (n,) whether steps lead nearer to the centre within the disc.
+
+        Args:
+            before: Distances from the centre where the steps begin [m].
+            after: Distances (n,) where they end [m].
+        """
+        return (after < self.radius) & (after - before < -NEARER)
+
     def describe(self) -> str:
         """Return it in words."""
         return (
@@ -61,7 +76,10 @@ class MarkedPlaces:
         self, start: NDArray[np.float64], ends: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
         """Return (n,) whether no path from a start (3,) may lead to ends (n, 3)."""
-        return self.refuses([np.stack([start, end]) for end in ends])
+        refused = np.zeros(len(ends), bool)
+        for place in self.places:
+            refused |= place.is_entered(place.away(start[None, :]), place.away(ends))
+        return refused
 
     def hold(self, candidate: Candidate) -> Candidate:
         """Return a path, refused where it enters a place."""
@@ -74,8 +92,8 @@ class MarkedPlaces:
         """Return the first pose that comes nearer to a centre within a disc, and its place."""
         firsts = []
         for place in self.places:
-            away = np.hypot(poses[:, 0] - place.x, poses[:, 1] - place.y)
-            enters = (away[1:] < place.radius) & (np.diff(away) < -NEARER)
+            away = place.away(poses)
+            enters = place.is_entered(away[:-1], away[1:])
             if enters.any():
                 firsts.append((1 + int(np.argmax(enters)), place))
         return min(firsts, key=lambda first: first[0], default=None)

@@ -170,20 +170,27 @@ def _about(pose: Floats) -> Floats:
     return np.concatenate([pose[..., :2], wrap(pose[..., 2:] + np.pi)], axis=-1)
 
 
-def connect_frontier(judge: PathJudge, nodes: Nodes, start: Pose, goal: Pose) -> list[Connection]:
+def connect_frontier(
+    judge: PathJudge, nodes: Nodes, known: NDArray[np.int64], start: Pose, goal: Pose
+) -> list[Connection]:
     """Return the nodes nearest to a goal on which the rover can stand, as ends of a path.
 
     They lie at least a quarter of the wheelbase apart. What is left to the goal has a price.
+
+    Args:
+        judge: The model.
+        nodes: All nodes.
+        known: Those (n,) that may be on known ground; the model is asked about no others.
+        start: Start of the path.
+        goal: The goal.
     """
-    everywhere = np.arange(0, nodes.count, HEADINGS)
-    away = np.hypot(*(nodes.poses(everywhere)[:, :2] - goal[:2]).T)
-    by_distance = everywhere[np.argsort(away, kind="stable")]
+    away = np.hypot(*(nodes.poses(known)[:, :2] - goal[:2]).T)
+    by_distance = known[np.argsort(away, kind="stable")]
     found: list[Connection] = []
     chosen: list[np.ndarray] = []
-    apart, places = 0.25 * judge.site.rover.wheelbase, max(1, FRONTIER_BATCH // HEADINGS)
-    for first in range(0, len(by_distance), places):
-        some = by_distance[first : first + places]
-        asked = (some[:, None] + np.arange(HEADINGS)).ravel()
+    apart = 0.25 * judge.site.rover.wheelbase
+    for first in range(0, len(by_distance), FRONTIER_BATCH):
+        asked = by_distance[first : first + FRONTIER_BATCH]
         poses = nodes.poses(asked)
         stands = np.array([code == "" for code in judge.stand(poses)])
         stands &= ~judge.site.marked.refuses_ends(start, poses)

@@ -9,7 +9,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
@@ -362,16 +362,19 @@ class _PathFinder:
             self._judge,
             edges,
             connect_end(rover, nodes, self._start, spacing, is_goal=False),
-            self._connect_goals(),
+            self._connect_goals(np.flatnonzero(~ground.groundless)),
             ground.doubt,
             estimate_difficulty(rover, terrain, nodes, climb, edges.samples),
             self.progress,
         )
 
-    def _connect_goals(self) -> list[Connection]:
-        """Return the connections of all goals; the way that is left from one has a price."""
+    def _connect_goals(self, known: NDArray[np.int64]) -> list[Connection]:
+        """Return the connections of all goals; the way that is left from one has a price.
+
+        A frontier is looked for among the nodes (n,) that may be on `known` ground.
+        """
         if self._to_frontier:
-            return connect_frontier(self._judge, self._nodes, self._start, self._goal)
+            return connect_frontier(self._judge, self._nodes, known, self._start, self._goal)
         rover, spacing = self._site.rover, self._site.options.waypoint_spacing
         found = []
         for goal in self._goals:

@@ -11,7 +11,7 @@ import pytest
 from rover_physics import Terrain, judge_path, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
-from rover_planner.planning.search import lattice_search, query
+from rover_planner.planning.search import lattice_search, path_search, query
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.graph import ShortestPaths, edge_cost
 from rover_planner.planning.search.ground_estimate import FULL_DOUBT, estimate_ground
@@ -272,6 +272,14 @@ def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
     assert f"{left:.1f} m before it" in answer.reason
     # On level ground, a wheel of the rover that stands across the edge is 0.4 m from its middle.
     assert 1.0 < left < 1.7
+
+
+def test_unknown_ground_before_a_far_goal_leaves_the_budget_to_the_search(monkeypatch):
+    """The model was asked about all poses on it, nearest to the goal first: there was no way."""
+    monkeypatch.setattr(path_search, "POSES_PER_SECOND", 100)
+    half_known = make_terrain(lambda x, y: np.where(x > -1.0, np.nan, waves(x, y)))
+    answer = find_path(ask(half_known, goal=(3.9, 0.0, 0.0)), replace(LONG, frontier=True))
+    assert answer.outcome == FOUND and answer.path.poses[-1, 0] > -1.7
 
 
 def test_a_way_to_the_frontier_is_none_to_the_goal_once_that_is_known():
