@@ -98,10 +98,10 @@ def endless():
 @pytest.fixture
 def lasting(monkeypatch):
     """Let a measurement count as one of now for a minute: a late thread changes nothing."""
-    from rover_planner.planning.answering import traverse_service
+    from rover_planner.planning.answering.traverse_service import TraverseService
 
-    monkeypatch.setattr(traverse_service, "MAX_AGE", 60.0)
-    monkeypatch.setattr(traverse_service.TraverseService.fresh_pose, "__defaults__", (60.0,))
+    monkeypatch.setattr(TraverseService._is_recent, "__kwdefaults__", {"max_age": 60.0})
+    monkeypatch.setattr(TraverseService.fresh_pose, "__defaults__", (60.0,))
 
 
 @pytest.fixture

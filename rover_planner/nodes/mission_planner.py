@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.exceptions import ParameterException
 
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
@@ -68,18 +68,24 @@ def _run(argv: Sequence[str] | None) -> int:
     except RoverError as error:
         return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
     init_ros(argv)
-    node = MissionPlanner(options.map_frame, options.timeout)
+    node = None
     try:
+        node = MissionPlanner(options.map_frame, options.timeout)
         return _carry_out(node, terrain, options)
     except NoAnswerError as error:
         return end_with(NODE_NAME, EXIT_NO_ANSWER, str(error))
     except DriveFailedError as error:
         return end_with(NODE_NAME, EXIT_FAILED, str(error))
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_INTERRUPTED
+    except ParameterException as error:  # ROS has parameters of its own
+        return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
+    except Exception:
+        if rclpy.ok():
+            raise
+        return EXIT_INTERRUPTED  # a signal has shut ROS down, where calls of it fail then
     finally:
         rclpy.try_shutdown()
-        node.destroy_node()
+        if node is not None:
+            node.destroy_node()
 
 
 def _carry_out(planner: MissionPlanner, terrain: Terrain | None, options: MissionOptions) -> int:

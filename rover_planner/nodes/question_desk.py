@@ -21,7 +21,7 @@ from msg_adapters.results.diagnostics import SEARCH, make_status
 from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget
-from rover_planner.planning.answering.judgement import PathJudgement
+from rover_planner.planning.answering.judgement import PathJudgement, refuse_for
 from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
 from rover_planner.planning.answering.questions import Question, Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
@@ -108,12 +108,17 @@ class QuestionDesk:
             kind: Its type.
             service: Its name.
             read: Returns the question of a request.
-            fill: Called with a request, its response and the answer; fills the response.
+            fill: Called with a request, its response and the answer; fills the response. If it
+                raises, it is called again, with a refusal for that error.
         """
 
         def receive(request: Any, response: Any, reply: Reply) -> None:
             def respond(answer: Answer[Any]) -> None:
-                fill(request, response, answer)
+                try:
+                    fill(request, response, answer)
+                except Exception as error:
+                    text = self._node.guard.report(service, error)
+                    fill(request, response, replace(answer, judgement=refuse_for(text)))
                 reply(response)
 
             self.ask(service, read(request), respond)

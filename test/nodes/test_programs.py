@@ -99,10 +99,11 @@ def test_a_part_that_cannot_be_imported_is_named_in_one_line(absent, said, monke
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_a_program_cleanly_while_it_is_imported(how, monkeypatch, capfd):
+@pytest.mark.parametrize(("name", "code"), [("traverse_server", 0), ("mission_planner", 130)])
+def test_a_signal_ends_a_program_cleanly_while_it_is_imported(name, code, how, monkeypatch, capfd):
     monkeypatch.setattr(start.importlib, "import_module", lambda _: os.kill(os.getpid(), how))
-    monkeypatch.setattr(sys, "argv", ["mission_planner"])
-    assert start.start_mission_planner() == 0
+    monkeypatch.setattr(sys, "argv", [name])
+    assert getattr(start, f"start_{name}")() == code
     assert capfd.readouterr() == ("", "")
 
 

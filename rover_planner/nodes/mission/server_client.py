@@ -142,7 +142,7 @@ class ServerClient(Node):
             "max_wheel_load": self._largest("wheel_loads", rows),
             "max_slip_ratio": self._largest("slip_ratios", rows),
         }
-        return _read_answer(verdict, "waypoints" in verdict, report)
+        return _read_answer(verdict, report)
 
     def check(self, poses: Floats) -> Answer:
         """Return whether the rover can drive a path of poses (n, 3) now."""
@@ -155,7 +155,7 @@ class ServerClient(Node):
                 if told["path_hash"] == about:  # else it was an earlier one, or another client's
                     report = {key: told[key] for key in ("traversable", "reason")}
                     report |= {"poses": poses.tolist(), "waypoints": len(poses)}
-                    return _read_answer(told, True, report)
+                    return _read_answer(told, report)
         raise NoAnswerError(f"waited {timeout:.0f} s in vain for {self._checker.service_name}")
 
     def ask_advice(self) -> dict[str, Any]:
@@ -221,8 +221,9 @@ class ServerClient(Node):
         self._arrays[name] = array_values(message)
 
 
-def _read_answer(verdict: dict[str, Any], was_judged: bool, report: dict[str, Any]) -> Answer:
+def _read_answer(verdict: dict[str, Any], report: dict[str, Any]) -> Answer:
     """Return the answer of a verdict; its report has the path."""
+    was_judged = "waypoints" in verdict
     told = {key: verdict[key] for key in ("traversable", "code", "reason")}
     return Answer(**told, was_judged=was_judged, poses=report["poses"], report=report)
 

@@ -19,7 +19,7 @@ from rover_physics.numerics.interruption import interruptible
 from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refuse_for
 from rover_planner.planning.answering.server_health import Health
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -227,8 +227,8 @@ class PathWatch:
             except Exception as error:
                 if self._ends:
                     return
-                text = f"internal error: {self._node.guard.report('monitor', error)}"
-                finding = self._monitor.stop(refusal("internal_error", text))
+                text = self._node.guard.report("monitor", error)
+                finding = self._monitor.stop(refuse_for(text))
             self._hand_over(finding, sight)
 
     def _look(self, sight: Sight, path: WatchedPath | None) -> Finding:

@@ -151,6 +151,11 @@ def refusal(code: str, reason: str) -> PathJudgement:
     return PathJudgement(code, reason)
 
 
+def refuse_for(error: str) -> PathJudgement:
+    """Return the refusal for an error of this program, told in one line."""
+    return refusal("internal_error", f"internal error: {error}")
+
+
 def _report_drive(candidate: Candidate) -> dict[str, Any]:
     """Return the first failure of a path, its extremes, length, time [s] and energy [J]."""
     verdict, prediction = candidate.verdict, candidate.prediction

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_planner.planning.answering.budget import BUSY, TOO_LONG, Budget, QuestionStoppedError
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refusal, refuse_for
 
 HOPELESS = 0.02
 """Share of its time that a waiting question must have left to be worth waiting for."""
@@ -126,8 +126,7 @@ class QuestionQueue(Generic[One, Judgement]):
         except RoverError as error:
             return refusal("bad_request", str(error))
         except Exception as error:
-            text = self._report(asked.service, error)
-            return refusal("internal_error", f"internal error: {text}")
+            return refuse_for(self._report(asked.service, error))
 
 
 def _refuse_late(asked: Asked) -> PathJudgement:

@@ -132,6 +132,27 @@ def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for(run_pl
     assert "in vain for the service /traverse_server/can_traverse and the topic /tra" in err
 
 
+def test_a_path_that_is_refused_before_it_is_judged_was_not_judged(server, planner):
+    planner.wait_for_server()
+    answer = planner.check(np.array([(-2.0, 0.0, 0.0), (0.0, 0.0, 0.0)]))
+    assert (answer.code, answer.was_judged) == ("no_map", False)
+
+
+def test_a_wrong_parameter_of_ros_is_bad_input_and_a_signal_between_two_looks_an_interruption(
+    run_planner, monkeypatch
+):
+    code, _, err = run_planner(NEAR, "--ros-args", "-p", "use_sim_time:=5")
+    assert code == 2 and err.count("\n") == 1 and "use_sim_time" in err
+
+    def check(planner):
+        rclpy.shutdown()  # as the handler of a signal does
+        planner.check(np.zeros((2, 3)))
+
+    monkeypatch.setattr(mission_planner.MissionPlanner, "wait_for_server", check)
+    code, _, err = run_planner(NEAR)
+    assert (code, err) == (130, "")
+
+
 def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again(
     mapped, endless, planner
 ):

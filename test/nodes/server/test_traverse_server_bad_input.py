@@ -35,6 +35,21 @@ def test_questions_before_any_map_or_path_are_refused_and_answered_after_it(serv
     assert len(client.can_traverse(START, GOAL).poses) > 2
 
 
+def test_an_answer_of_which_no_messages_can_be_made_is_refused(shared, monkeypatch):
+    server, publish, told = shared.server, shared.server.publish, []
+
+    def publish_refusals(judgement, identity):
+        told.append(judgement.code)
+        if not judgement.code:
+            raise MemoryError
+        return publish(judgement, identity)
+
+    monkeypatch.setattr(server, "publish", publish_refusals)
+    answer = shared.client.check_poses(server, [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]])
+    assert not answer.success and json.loads(answer.message)["code"] == "internal_error"
+    assert told == ["", "internal_error"]
+
+
 def test_bad_requests_maps_and_paths_are_refused_with_their_reason_and_the_node_lives_on(shared):
     server, client = shared.server, shared.client
     before = server.service.known_map.fingerprint
