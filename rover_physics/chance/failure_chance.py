@@ -2,7 +2,8 @@
 """The chance that a path fails: the share of a fixed set of samples in which it breaks a limit.
 
 Poses that use less than FAR of every limit keep them in all samples. So do those that use less
-than NEAR with the least friction and torque of all samples, and all else off to either side. The
+than NEAR with the least friction and torque of all samples, and all else off to either side. Where
+wheels stand on rocks, a place a little aside has other contacts, and only ROCKY_FAR is safe. The
 others are evaluated anew in each sample, with the contacts that they have at its place: samples
 that share a place settle once. Drops and poses between waypoints are those of the prediction. On
 even ground a share of the model's error counts.
@@ -40,6 +41,8 @@ SAMPLES, PLACES = 32, 8
 FAR = 0.5
 """Use of a limit below which no sample breaks it: it would have to double. Less where friction or
 torque of a sample may be less than half."""
+ROCKY, ROCKY_FAR = 0.3, 0.25
+"""Difference of contact angles [rad] above which the ground is rocky, and what FAR is there."""
 NEAR = 0.95
 """Use with the least friction and torque of all samples below which no sample breaks a limit."""
 EVEN, EVEN_SHARE = 0.1, 0.3
@@ -143,17 +146,20 @@ def _find_asked(
 
     Where heights are uncertain, all that use more than FAR are asked.
     """
-    worst_two = worst_of(groups)
+    worst_two, n = worst_of(groups), len(swept.prediction.poses)
     weakest = worst_two[0].samples[0]
     far = min(FAR, NEAR * min(weakest.friction[0], weakest.torque))
+    rocky = _unevenness(rows.results) > ROCKY
+    rocky[n:] = False  # poses between waypoints stay where they are
     near = _find_near(model, swept, rows.results, on_path, far)
+    near |= rocky & _find_near(model, swept, rows.results, on_path, min(far, ROCKY_FAR))
     near &= rows.results["status"] == PoseStatus.SETTLED
     if not near.any() or model.terrain.elevation_std is not None:
         return np.flatnonzero(near), on_path
-    closer = _find_near(model, swept, rows.results, on_path, NEAR)
+    closer = rocky | _find_near(model, swept, rows.results, on_path, NEAR)
     by_path, asked = _needs_path(model, rows.results), np.flatnonzero(near)
     for group in worst_two:
-        found = _evaluate(model, rows, asked, len(swept.prediction.poses), group)[0]
+        found = _evaluate(model, rows, asked, n, group)[0]
         worst = _place(rows, asked, found)
         if on_path:
             _write_path(model, swept, worst)
@@ -174,6 +180,12 @@ def _all_rows(swept: SweptPath) -> Crossings:
     places = np.arange(float(n)), prediction.waypoint, none_held(n)
     waypoints = Crossings(*places, prediction.poses, prediction.results)
     return join_crossings([waypoints, swept.crossings])
+
+
+def _unevenness(results: np.ndarray) -> Floats:
+    """Return the difference of the wheels' contact angles (n,) [rad] at RESULTs."""
+    angles = results["contact_angle"]
+    return np.asarray(angles.max(axis=1) - angles.min(axis=1))
 
 
 def _find_near(
@@ -222,8 +234,7 @@ def _evaluate(
     poses = np.where((asked < waypoints)[:, None], group.move(rows.poses), rows.poses)
     motions = np.ascontiguousarray(rows.results["motion"])
     results = unwritten_results(len(group.samples) * len(poses)).reshape(-1, len(poses))
-    angles = rows.results["contact_angle"]
-    is_even = angles.max(axis=1) - angles.min(axis=1) < EVEN
+    is_even = _unevenness(rows.results) < EVEN
     for share, own in ((EVEN_SHARE, is_even), (1.0, ~is_even)):
         here = np.flatnonzero(own)
         if len(here):

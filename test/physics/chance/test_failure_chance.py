@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.chance import HELD_OUT, find_chance, read_driven_paths
 from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_rover
+from rover_physics.chance import failure_chance
 from rover_physics.chance.failure_chance import EVEN_SHARE, PLACES, SAMPLES
 from rover_physics.chance.samples import DEVIATES, draw_samples
 from rover_physics.errors import ModelError, RoverFileError
@@ -20,7 +21,7 @@ from support.grounds import make_terrain
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import plane, with_std
+from support.rough_grounds import plane, rocky, with_std
 
 EXACT = Uncertainty(**{one.name: 0.0 for one in fields(Uncertainty)})
 FRICTION = 0.5
@@ -155,6 +156,15 @@ def test_deviations_count_near_the_limit_of_friction(name, std):
 )
 def test_deviations_count_near_the_limit_of_torque(name, std):
     assert 0.0 < chance_near_torque(plane(0.1, 0.2), rover_with(**{name: std})) < 1.0
+
+
+def test_rocks_beside_the_path_count(monkeypatch):
+    """The path was told 0.03: where it is, the wheels touch the rocks' lower parts."""
+    asked = load_rover("lsr1"), rocky(8), straight(21), SweepOptions(friction=0.6)
+    told = judge_path(*asked, accepted_chance=1.0)[1].failure_chance
+    monkeypatch.setattr(failure_chance, "FAR", 0.0)
+    monkeypatch.setattr(failure_chance, "NEAR", 0.0)  # all poses are asked in all samples
+    assert told == judge_path(*asked, accepted_chance=1.0)[1].failure_chance > 0.2
 
 
 def test_uncertain_heights_count():
