@@ -16,11 +16,7 @@ from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.survey import prepare_survey
 from rover_planner.viewer.state.survey_layers import load_map
 from support.command_line import assert_refused
-from support.survey_maps import (
-    compute_here,
-    make_request,
-    make_rough_map,
-)
+from support.survey_maps import compute_here, make_request, make_rough_map
 
 rasterio = pytest.importorskip("rasterio", reason="install the extra survey")
 
