@@ -29,8 +29,8 @@ MARS = (
 LEFT, TOP, CELL = 812_345.5, -245_678.25, 0.1
 
 
-def write_tif(path, heights, **changes):
-    """Write heights with row 0 in the north."""
+def write_tif(path, heights, notes=None, **changes):
+    """Write heights with row 0 in the north, and notes on its bands, such as their scales."""
     heights = np.asarray(heights)
     bands = heights if heights.ndim == 3 else heights[None]
     profile = {
@@ -45,13 +45,10 @@ def write_tif(path, heights, **changes):
         "blockxsize": 64,
         "blockysize": 64,
     } | changes
-    unit, scale = profile.pop("unit", None), profile.pop("scale", None)
     with rasterio.open(path, "w", **profile) as file:
         file.write(bands)
-        if unit:
-            file.units = [unit] * len(bands)
-        if scale is not None:
-            file.scales = [scale] * len(bands)
+        for name, values in (notes or {}).items():
+            setattr(file, name, values)
     return path
 
 
@@ -85,9 +82,8 @@ def test_overviews_have_values_of_the_layer(tmp_path, kind):
 def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
     values = np.full((30, 40), 1234, np.int16)
     values[3, 5], values[7, 9] = -9999, 1300
-    path = write_tif(tmp_path / "map.tif", values, nodata=-9999)
-    with rasterio.open(path, "r+") as file:
-        file.scales, file.offsets = [0.01], [100.0]
+    notes = {"scales": [0.01], "offsets": [100.0]}
+    path = write_tif(tmp_path / "map.tif", values, notes, nodata=-9999)
     heights = GeoTiffMap(path).read((slice(0, 30), slice(0, 40)))["elevation"]
     assert np.isnan(heights[26, 5]) and np.isnan(heights).sum() == 1
     assert heights[22, 9] == pytest.approx(113.0) and heights[0, 0] == pytest.approx(112.34)
@@ -105,8 +101,8 @@ def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
         ({"crs": "+proj=stere +lat_0=-90 +R=1737400 +units=km"}, "has coordinates in kilometre"),
         ({"crs": None}, "has no coordinate reference system"),
         ({"crs": 'LOCAL_CS["site",UNIT["metre",1]]'}, "is in coordinates of another kind"),
-        ({"scale": 0.0}, "has heights with scale 0 and offset 0"),
-        ({"unit": "ft"}, "has heights in 'ft'; they must be in metres"),
+        ({"notes": {"scales": [0.0]}}, "has heights with scale 0 and offset 0"),
+        ({"notes": {"units": ["ft"]}}, "has heights in 'ft'; they must be in metres"),
         ({"transform": rasterio.Affine.rotation(10) @ rasterio.Affine.scale(0.1, -0.1)},
          "is rotated or mirrored"),
         ({"transform": rasterio.Affine(0.1, 0, 0, 0, 0.1, 0)}, "is rotated or mirrored"),
