@@ -69,7 +69,7 @@ class EdgeMemory:
     def recall_poses(self, site: Site) -> PosesByModel:
         """Return what is known of poses of whole paths, and of pieces; what is added is kept."""
         if self._poses is None or not _is_alike(self._poses[0], site):
-            of_pieces, is_same = KnownPoses(), site.options.accepted_chance >= 1.0
+            of_pieces, is_same = KnownPoses(), site.options.asked_chance is None
             known = KnownPoses(others=of_pieces if is_same else None), of_pieces
         else:
             asked, known = self._poses
