@@ -43,7 +43,7 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
     options, memory, rng = OPTIONS.change(policy=policy), EdgeMemory(), np.random.default_rng(3)
     for _ in range(12):
         site = Site(LSR1, ground, options)
-        judge = PathJudge(site, *memory.recall_poses(site))
+        judge = PathJudge(site, *memory.begin(site))
         part, whole = judge.check(WAY), PathJudge(site).check(WAY)
         assert part.verdict == whole.verdict
         assert_same(part.prediction, whole.prediction)
