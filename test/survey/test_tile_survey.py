@@ -20,6 +20,7 @@ from rover_planner.survey.layers import (
 )
 from rover_planner.survey.layout import choose_chunk, find_halo
 from rover_planner.survey.tile_survey import outline_of, survey_tile
+from support.grounds import raised
 from support.rovers import LSR1
 from support.survey_maps import (
     assert_same_bits,
@@ -148,9 +149,7 @@ def test_the_chance_of_a_cell_is_that_of_its_headings_and_1_where_one_fails_as_t
 
 def test_no_cell_passes_whose_outline_touches_unknown_ground():
     request = make_request(headings=16)
-    heights = np.zeros((60, 60))
-    heights[30, 30] = np.nan
-    ground = Terrain(heights, 0.05)
+    ground = raised(Terrain(np.zeros((60, 60)), 0.05), (30, 30), np.nan)
     places = places_on(ground, 1)
     passes = unpack_bits(survey_tile(request, ground, places)["passable_headings"], 16)
     rear, front, right, left = outline_of(request.rover)

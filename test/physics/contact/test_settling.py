@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from support.grounds import make_terrain
+from support.grounds import make_terrain, raised
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import reference_predictions, steered_predictions
@@ -60,9 +60,8 @@ def test_turned_wheels_touch_by_an_independent_dense_look_over_their_whole_width
 
 def test_a_peak_below_a_wheel_is_found_wherever_it_is():
     """Also between the circles of the wheel that are looked at first."""
-    heights = np.zeros((241, 241))
-    heights[120 - 31, 120] = 0.03  # below the middle right wheel
-    ground = Terrain(heights, 0.01, (-1.2, -1.2))
+    level = Terrain(np.zeros((241, 241)), 0.01, (-1.2, -1.2))
+    ground = raised(level, (120 - 31, 120), 0.03)  # below the middle right wheel
     x = LSR1.suspension.wheels["middle"][0]
     aside = 0.45 * LSR1.wheel.width * np.linspace(-1.0, 1.0, 19)
     prediction = judge_poses(LSR1, ground, poses_at(-x, aside), np.zeros(19))[0]
@@ -205,23 +204,15 @@ def test_poses_that_do_not_settle_have_nan_for_every_number():
             assert np.isfinite(values[0]).all() and np.isnan(values[1]).all(), one.name
 
 
-HALF, RESOLUTION = 60, 0.02
 COARSE = 0.05 * (-3.5 + np.arange(9.0))
 """Heights of a slope on cells larger than the belly [m]."""
-
-
-def unknown_around(rows: int, columns: int) -> Terrain:
-    """Return level ground with so many unknown cells to each side of the middle of the rover."""
-    z = np.zeros((2 * HALF + 1, 2 * HALF + 1))
-    z[HALF - rows : HALF + rows + 1, HALF - columns : HALF + columns + 1] = np.nan
-    return Terrain(z, RESOLUTION, (-HALF * RESOLUTION, -HALF * RESOLUTION))
 
 
 @pytest.mark.parametrize(
     ("ground", "clearance"),
     [
-        (unknown_around(0, 0), 0.24),  # unknown cells are passed over
-        (unknown_around(11, 16), np.nan),
+        (raised(LEVEL, (30, 30), np.nan), 0.24),  # unknown cells are passed over
+        (raised(LEVEL, np.s_[25:36, 22:39], np.nan), np.nan),  # all cells below the belly
         (Terrain(np.zeros((9, 9)), 1.0, (-3.5, -3.5)), 0.24),
         (Terrain(np.tile(COARSE, (9, 1)), 1.0, (-3.5, -3.5)), 0.24 / np.cos(np.arctan(0.05))),
     ],

@@ -4,7 +4,7 @@
 import gc
 import pickle
 import weakref
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from rover_physics import Terrain, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
 from rover_physics.terrain.ground import BLOCK, friction_at, height_inside, pack_ground
 from rover_physics.terrain.terrain_file import terrain_presets
+from support.grounds import raised
 from support.rough_grounds import plane
 
 
@@ -47,9 +48,7 @@ def test_look_up_is_unknown_off_the_map_and_where_a_corner_is_unknown():
     y = [0.0, 0.0, ymin - 0.01, ymax + 0.01, 0.0]
     assert np.isnan(terrain.elevation_at(x, y)).all()
     assert not terrain.contains(x, y).any()
-    heights = terrain.elevation.copy()
-    heights[2, 3] = np.nan
-    terrain = Terrain(heights, 0.5, (-1.0, 2.0))
+    terrain = raised(Terrain(terrain.elevation, 0.5, (-1.0, 2.0)), (2, 3), np.nan)
     x, y, near = -1.0 + 0.5 * 3, 2.0 + 0.5 * 2, np.array([-0.2, 0.2])
     around = terrain.elevation_at(x + near[:, None], y + near)
     assert around.shape == (2, 2) and np.isnan(around).all()
@@ -100,25 +99,20 @@ def test_a_wrong_value_is_refused_by_its_name(name, value, text):
 
 
 def test_a_filled_gap_is_as_uncertain_as_the_worst_of_its_rim():
-    _, gapped = with_gap()
-    heights = gapped.elevation.copy()
-    heights[2, 2] = np.nan
-    heights[3, 3] = np.nan
-    std = np.where(np.isnan(heights), np.nan, 0.01)
+    gapped = raised(with_gap()[1], ([2, 3], [2, 3]), np.nan)
+    std = np.where(np.isnan(gapped.elevation), np.nan, 0.01)
     std[7, 10], std[2, 3], std[15, 15] = 0.05, 0.03, 0.9
-    filled = Terrain(heights, 0.1, elevation_std=std).fill_gaps(0.3).elevation_std
+    filled = replace(gapped, elevation_std=std).fill_gaps(0.3).elevation_std
     assert filled is not None
     assert (filled[8:11, 9:14] == 0.05).all()
     assert (filled[2, 2], filled[3, 3]) == (0.03, 0.03)
-    known = np.isfinite(heights)
+    known = np.isfinite(gapped.elevation)
     assert np.array_equal(filled[known], std[known])
 
 
 def with_gap(rows=slice(8, 11), columns=slice(9, 14)):
-    whole = plane(-0.2, 0.3)
-    heights = whole.elevation.copy()
-    heights[rows, columns] = np.nan
-    return whole, Terrain(heights, 0.1)
+    whole = Terrain(plane(-0.2, 0.3).elevation, 0.1)
+    return whole, raised(whole, (rows, columns), np.nan)
 
 
 def test_a_gap_in_a_plane_is_filled_exactly_if_its_shorter_side_is_no_wider():

@@ -4,11 +4,11 @@
 import numpy as np
 import pytest
 
-from rover_physics import Terrain
 from rover_physics.errors import ModelError
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import MotionContactEstimator
 from rover_physics.traction.map_contacts import MapContactFinder
+from support.grounds import raised
 from support.paths import arc_of, poses_at
 from support.reference_drives import drive_ground
 from support.rough_grounds import fractal, plane, rocky
@@ -104,9 +104,8 @@ def test_an_estimate_stays_as_it_is_when_the_next_one_is_made():
 
 
 def test_ground_that_the_map_does_not_have_is_refused_by_wheel():
-    elevation = np.zeros((101, 101))
-    elevation[:, 55:] = np.nan
-    finder = MapContactFinder(LSR1, Terrain(elevation, 0.04, (-2.0, -2.0)))
+    half_known = raised(plane(0.0, 0.0, half=2.0), np.s_[:, 55:], np.nan)
+    finder = MapContactFinder(LSR1, half_known)
     prediction, _, _ = drive_states(LSR1, plane(0.0, 0.0, half=2.5))
     with pytest.raises(ModelError, match="front_right"):
         finder.find(state_of(LSR1, prediction, 600), np.array([0.0, 0.0, 0.3, 0.0]), 0.0)
