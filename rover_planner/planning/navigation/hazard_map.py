@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from rover_physics.rover.extent import reach_of_links
-from rover_physics.rover.model import Rover
+from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import (
     IMPASSABLE,
@@ -26,12 +25,10 @@ TILE = 32
 BATCH = 4096
 """Poses for which tiles are judged together; fewer would not use all threads."""
 MARGIN = 2
-"""Cells by which a footprint is widened: a height counts for the ground up to one cell away. The
-other one is for safety."""
+"""Cells by which a rover's reach is widened: a height counts for the ground up to one cell away.
+The other one is for safety."""
 SHIFT_TOLERANCE = 1e-3
 """Share of a cell by which the grids of two maps may differ and still count as the same."""
-MAX_ROLL = 1.0
-"""Roll of a body that still stands [rad]; limits of tilt are far below it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +84,9 @@ class HazardMap:
             old, new = find_overlap(before.terrain, on_map.terrain, shift)
             classes[:, *new] = self._classes[:, *old]
             stale[:, *new] = self._stale[:, *old]
-            stale |= self._touch_changes(on_map, changed)
+            reach = math.ceil(find_reach(on_map.rover) / on_map.terrain.resolution) + MARGIN
+            near = ndimage.maximum_filter(changed, 2 * reach + 1, mode="constant")
+            stale |= near[1:-1, 1:-1]
         self._on_map, self._classes, self._stale = on_map, classes, stale
 
     def work(self, seconds: float, near: tuple[float, float] | None = None) -> bool:
@@ -122,26 +121,6 @@ class HazardMap:
         x, y = terrain.origin
         return HazardView(classes, float(terrain.resolution), (float(x), float(y)))
 
-    def _touch_changes(self, on_map: RoverOnMap, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return (headings, ny, nx) True where a changed cell is below the rover.
-
-        `changed` (ny + 2, nx + 2) has one more cell at each side of the map.
-        """
-        (ahead, aside), cell = find_footprint(on_map.rover), on_map.terrain.resolution
-        ny, nx = changed.shape
-        found = np.zeros((self.headings, ny - 2, nx - 2), bool)
-        if not changed.any():
-            return found
-        grown: dict[tuple[int, int], NDArray[np.bool_]] = {}
-        for heading, yaw in enumerate(self._yaw.tolist()):
-            c, s = abs(math.cos(yaw)), abs(math.sin(yaw))
-            halves = c * ahead + s * aside, s * ahead + c * aside
-            x, y = (math.ceil(half / cell) + MARGIN for half in halves)
-            if (y, x) not in grown:
-                grown[y, x] = _grow(changed, (y, x))
-            found[heading] = grown[y, x][1:-1, 1:-1]
-        return found
-
     def _batches(
         self, terrain: Terrain, near: tuple[float, float] | None
     ) -> Iterator[NDArray[np.intp]]:
@@ -168,19 +147,6 @@ class HazardMap:
             yield batch
 
 
-def _grow(cells: NDArray[np.bool_], widths: tuple[int, int]) -> NDArray[np.bool_]:
-    """Return cells that have a True cell within `widths` rows and columns."""
-    where = ndimage.find_objects(cells.astype(np.int8))[0]
-    box = tuple(
-        slice(max(0, one.start - width), one.stop + width)
-        for one, width in zip(where, widths, strict=True)
-    )
-    size = 2 * widths[0] + 1, 2 * widths[1] + 1
-    grown = np.zeros(cells.shape, bool)
-    grown[box] = ndimage.maximum_filter(cells[box].astype(np.uint8), size, mode="constant")
-    return grown
-
-
 def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
     """Return how far the grid has moved; None if nothing of the old map can be used."""
     old, new = before.terrain, now.terrain
@@ -199,20 +165,3 @@ def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
     if old.origin != new.origin and np.abs(moved - cells).max() > SHIFT_TOLERANCE:
         return None
     return int(cells[1]), int(cells[0])
-
-
-def find_footprint(rover: Rover) -> tuple[float, float]:
-    """Return how far a rover extends from its body origin along and across its heading [m].
-
-    It never leaves this rectangle, whatever the angles of its suspension: a wheel is never further
-    from its pivots than its links are long. A body that rolls by up to MAX_ROLL moves it sideways
-    by that length times the sine.
-    """
-    wheel, steep = rover.wheel, math.sin(MAX_ROLL)
-    ahead = aside = 0.0
-    for name, centre in rover.suspension.wheels.items():
-        along = reach_of_links(rover, name) + wheel.radius
-        across = abs(centre[1]) + 0.5 * wheel.width
-        ahead, aside = max(ahead, along), max(aside, math.hypot(across, steep * along))
-    x, y, z = (max(map(abs, side)) for side in (rover.belly.x, rover.belly.y, (rover.belly.z,)))
-    return (max(ahead, math.hypot(x, z)), max(aside, math.hypot(y, z)))
