@@ -18,6 +18,7 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
+from rover_planner.maps.cells import grid_of
 from rover_planner.maps.changes import Shift, find_changes, find_overlap, have_same_layers
 
 TILE = 32
@@ -65,25 +66,25 @@ class HazardMap:
         self._yaw = np.arange(headings) * (2.0 * math.pi / headings)
         self._on_map: RoverOnMap | None = None
         self._classes = np.empty((headings, 0, 0), np.int8)
-        self._stale = np.empty((headings, 0, 0), bool)
+        self._stale: NDArray[np.bool_] = np.empty((0, 0), bool)
 
     @property
     def stale_count(self) -> int:
         """Number of poses that are not judged on the present map."""
-        return int(np.count_nonzero(self._stale))
+        return self.headings * int(np.count_nonzero(self._stale))
 
     def take(self, on_map: RoverOnMap) -> None:
         """Take a rover on a map; what the change of the map cannot have changed stays."""
-        before, shape = self._on_map, (self.headings, *on_map.terrain.elevation.shape)
+        before, shape = self._on_map, on_map.terrain.elevation.shape
         shift = None if before is None else _find_shift(before, on_map)
-        classes, stale = np.full(shape, UNKNOWN, np.int8), np.ones(shape, bool)
+        classes, stale = np.full((self.headings, *shape), UNKNOWN, np.int8), np.ones(shape, bool)
         if before is not None and shift is not None:
             if before.terrain is on_map.terrain:
                 return
             changed = find_changes(before.terrain, on_map.terrain, shift)
             old, new = find_overlap(before.terrain, on_map.terrain, shift)
             classes[:, *new] = self._classes[:, *old]
-            stale[:, *new] = self._stale[:, *old]
+            stale[new] = self._stale[old]
             reach = math.ceil(find_reach(on_map.rover) / on_map.terrain.resolution) + MARGIN
             near = ndimage.maximum_filter(changed, 2 * reach + 1, mode="constant")
             stale |= near[1:-1, 1:-1]
@@ -103,11 +104,13 @@ class HazardMap:
             return True
         end = time.monotonic() + seconds
         terrain = self._on_map.terrain
-        for heading, row, column in self._batches(terrain, near):
-            (x, y), cell = terrain.origin, terrain.resolution
-            poses = np.column_stack([x + cell * column, y + cell * row, self._yaw[heading]])
-            self._classes[heading, row, column] = classify_poses(self._on_map, poses)
-            self._stale[heading, row, column] = False
+        for row, column in self._batches(terrain, near):
+            poses = np.empty((self.headings, len(row), 3))
+            poses[..., 0], poses[..., 1] = grid_of(terrain).places(column, row)
+            poses[..., 2] = self._yaw[:, None]
+            found = classify_poses(self._on_map, poses.reshape(-1, 3))
+            self._classes[:, row, column] = found.reshape(self.headings, -1)
+            self._stale[row, column] = False
             if time.monotonic() > end:
                 break
         return not self._stale.any()
@@ -124,23 +127,22 @@ class HazardMap:
     def _batches(
         self, terrain: Terrain, near: tuple[float, float] | None
     ) -> Iterator[NDArray[np.intp]]:
-        """Yield heading, row and column (3, n) of stale poses, BATCH or more at a time.
+        """Yield row and column (2, n) of cells with stale poses, BATCH poses or more at a time.
 
         They come tile by tile, the nearest first.
         """
-        any_heading = self._stale.any(axis=0)
-        rows, columns = (math.ceil(n / TILE) for n in any_heading.shape)
-        padded = np.zeros((rows * TILE, columns * TILE), bool)
-        padded[: any_heading.shape[0], : any_heading.shape[1]] = any_heading
-        tiles = np.argwhere(padded.reshape(rows, TILE, columns, TILE).any(axis=(1, 3)))
+        row, column = np.nonzero(self._stale)
+        is_stale = np.zeros(np.array(self._stale.shape) // TILE + 1, bool)
+        is_stale[row // TILE, column // TILE] = True
+        tiles = np.argwhere(is_stale)
         if near is not None:
             place = (np.array(near) - terrain.origin) / (TILE * terrain.resolution) - 0.5
             tiles = tiles[np.argsort(np.hypot(*(tiles[:, ::-1] - place).T), kind="stable")]
-        batch = np.empty((3, 0), np.intp)
+        batch = np.empty((2, 0), np.intp)
         for i, j in TILE * tiles:
-            stale = np.nonzero(self._stale[:, i : i + TILE, j : j + TILE])
-            batch = np.concatenate([batch, np.add(stale, [[0], [i], [j]])], axis=1)
-            if batch.shape[1] >= BATCH:
+            stale = np.nonzero(self._stale[i : i + TILE, j : j + TILE])
+            batch = np.concatenate([batch, np.add(stale, [[i], [j]])], axis=1)
+            if self.headings * batch.shape[1] >= BATCH:
                 yield batch
                 batch = batch[:, :0]
         if batch.size:
