@@ -28,11 +28,6 @@ def waves(x, y):
     return 0.04 * np.sin(1.3 * x) + 0.03 * np.sin(1.7 * y + 0.4)
 
 
-def rocky(x, y):
-    """Return waves with a low rock to the left of the straight path from -x to +x."""
-    return waves(x, y) + 0.08 * np.exp(-((x - 0.2) ** 2 + (y - 0.35) ** 2) / 0.05)
-
-
 def wall_at(place):
     """Return waves with a wall of 1 m along y, at x = place."""
     return lambda x, y: waves(x, y) + np.where(x > place, 1.0, 0.0)

@@ -174,17 +174,17 @@ def balance_matrix(
     return np.hstack([A[:, :12], A[:, 12:] @ shares]), b, shares
 
 
-COARSE_ANGLES, COARSE_ACROSS = 121, 17
+COARSE_ANGLES, COARSE_ACROSS = 241, 33
 """Points along and across a wheel in the first look of `wheel_gaps`."""
-STARTS, REFINEMENTS = 6, 7
+STARTS, REFINEMENTS = 30, 7
 """Nearest points that are refined, and how often the spacing is divided by three."""
 
 
 def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the smallest vertical gap (6,) [m] between each wheel's lower half and the ground.
 
-    The whole width of the wheels of waypoint i is looked at, densely and at all vertices of the
-    ground, then around the nearest points.
+    The whole width of the wheels of waypoint i is looked at, densely, then around the nearest
+    points.
     """
     wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
     return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
@@ -209,7 +209,6 @@ def wheel_gap(rover: Rover, terrain: Terrain, centre: np.ndarray, axis: np.ndarr
         np.linspace(-half, half, COARSE_ACROSS),
     )
     places = np.stack([part.ravel() for part in grid])
-    places = np.hstack([places, vertices_below(rover, terrain, centre, (ahead, upward, axis))])
     gaps = gaps_at(*places)
     best = places[:, np.argsort(gaps)[:STARTS]]
     around = np.stack([part.ravel() for part in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 9)])])
@@ -221,24 +220,6 @@ def wheel_gap(rover: Rover, terrain: Terrain, centre: np.ndarray, axis: np.ndarr
         best = near[:, np.arange(STARTS), nearest]
         steps = steps / 3.0
     return float(gaps.min())
-
-
-def vertices_below(
-    rover: Rover, terrain: Terrain, centre: np.ndarray, frame: tuple[np.ndarray, ...]
-) -> np.ndarray:
-    """Return angles and places across (2, k) of a wheel above the vertices of the ground."""
-    ahead, upward, axis = frame
-    left = np.cross(UP, ahead)
-    reach = rover.wheel.radius + 0.5 * rover.wheel.width
-    first = np.floor((centre[:2] - reach - terrain.origin) / terrain.resolution)
-    steps = np.arange(2 + int(2.0 * reach / terrain.resolution))
-    cells = np.stack([part.ravel() for part in np.meshgrid(first[0] + steps, first[1] + steps)])
-    away = terrain.resolution * cells.T + terrain.origin - centre[:2]
-    sine = away @ ahead[:2] / rover.wheel.radius
-    cosine = np.sqrt(np.clip(1.0 - sine**2, 0.0, None))
-    across = (away @ left[:2] + rover.wheel.radius * cosine * (upward @ left)) / (axis @ left)
-    below = (np.abs(sine) < 1.0) & (np.abs(across) <= 0.5 * rover.wheel.width)
-    return np.stack([np.arcsin(sine[below]), across[below]])
 
 
 def turned_round(rover: Rover) -> Rover:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rover_physics import SweepOptions, Terrain, save_terrain
-from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk, survey_chunk
+from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, survey_chunk
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import SurveyStore
@@ -49,8 +49,7 @@ def prepare_here(
 def compute_here(prepared: PreparedSurvey) -> PreparedSurvey:
     """Survey the chunks that are left in this process, without a cluster."""
     for chunk in prepared.chunks:
-        layers = compute_chunk(prepared.job.request, prepared.store, chunk)
-        prepared.store.write(chunk, layers, 1.0)
+        survey_chunk(prepared.job, chunk)
     return prepared
 
 

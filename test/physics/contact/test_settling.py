@@ -14,16 +14,14 @@ from rover_physics.rover.urdf.read_rover import rover_from_urdf
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.project.checkout import TOP
-from support.reference_cases import reference_predictions, steered_predictions
+from support.reference_cases import STEERED, STRAIGHT, reference_predictions
 from support.rough_grounds import bouldered, fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gap, wheel_gaps
 from support.rovers import LSR1
 
 slopes = st.floats(-0.4, 0.4)
 both_sets = pytest.mark.parametrize(
-    ("predict", "count"),
-    [(reference_predictions, 81), (steered_predictions, 21)],
-    ids=["straight", "turned"],
+    ("files", "count"), [(STRAIGHT, 81), (STEERED, 21)], ids=["straight", "turned"]
 )
 
 
@@ -34,11 +32,9 @@ def waypoints_of(predictions):
 
 
 @both_sets
-def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_them(
-    predict, count
-):
+def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_them(files, count):
     errors, angles = [], []
-    for case, prediction in predict():
+    for case, prediction in reference_predictions(files):
         assert prediction.settled.all(), case.label
         away = prediction.wheel_centres - case.wheel_centres
         errors.append(np.linalg.norm(away, axis=2).ravel())
@@ -52,7 +48,7 @@ def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_t
 
 
 def test_turned_wheels_touch_by_an_independent_dense_look_over_their_whole_width():
-    cases = list(waypoints_of(steered_predictions()))[::4]  # a look takes long
+    cases = list(waypoints_of(reference_predictions(STEERED)))[::4]  # a look takes long
     gaps = np.concatenate([wheel_gaps(LSR1, case.terrain, p, i) for case, p, i in cases])
     assert gaps.size == 36
     assert gaps.max() <= 3e-4 and gaps.min() >= -1e-3
@@ -137,8 +133,8 @@ def test_no_rim_sinks_into_cells_twenty_times_as_large_as_the_wheel():
 
 
 @both_sets
-def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
-    for case, prediction, i in waypoints_of(predict()):
+def test_contact_points_lie_on_the_wheels_and_on_the_ground(files, count):
+    for case, prediction, i in waypoints_of(reference_predictions(files)):
         points, axes = prediction.contact_points[i], wheel_axes(LSR1, prediction, i)
         from_centre = points - prediction.wheel_centres[i]
         along = np.einsum("wk,wk->w", from_centre, axes)
