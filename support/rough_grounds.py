@@ -102,11 +102,9 @@ def enlarged(ground: Terrain, size: float) -> Terrain:
     )
 
 
-def scaled_for(
-    rover: Rover, ground: Terrain, poses: np.ndarray, radius: float = 0.1
-) -> tuple[Terrain, np.ndarray]:
-    """Return ground and poses as large for a rover as they are for one with wheels of `radius`."""
-    size = rover.wheel.radius / radius
+def scaled_for(rover: Rover, ground: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
+    """Return ground and poses as large for a rover as they are for one with wheels of 0.1 m."""
+    size = rover.wheel.radius / 0.1
     return enlarged(ground, size), poses * [size, size, 1.0]
 
 

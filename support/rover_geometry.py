@@ -83,20 +83,14 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
     )  # fmt: skip
 
 
-def wheel_axes(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return the axles (6, 3) of the wheels at waypoint i."""
-    return place_rover(rover, prediction, i).axles
-
-
-def contact_frames(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return the unit vectors n, t, a of each wheel (6, 3, 3) from attitude and contact angle.
+def contact_frames(a: np.ndarray, contact_angle: np.ndarray) -> np.ndarray:
+    """Return the unit vectors n, t, a of each wheel (6, 3, 3) from axles (6, 3) and angles (6,).
 
     n is the contact normal, a the wheel axis, t = a x n.
     """
-    a = wheel_axes(rover, prediction, i)
     ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP), axis=1)[:, None]
     upward = np.cross(ahead, a)
-    angle = prediction.contact_angle[i][:, None]
+    angle = contact_angle[:, None]
     n = np.cos(angle) * upward - np.sin(angle) * ahead
     return np.stack([n, np.cross(a, n), a], axis=1)
 
@@ -147,7 +141,8 @@ def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.nd
     """Return the residuals of the nine balance equations of waypoint i; see `balance_sums`."""
     placed = place_rover(rover, prediction, i)
     shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
-    forces = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(rover, prediction, i))
+    frames = contact_frames(placed.axles, prediction.contact_angle[i])
+    forces = np.einsum("kw,wkx->wx", np.array(shares), frames)
     acting = _on_wheels(prediction, i, placed, forces) + _weights(rover, placed)
     return balance_sums(rover, placed, acting)
 
@@ -160,7 +155,8 @@ def balance_matrix(
     A @ (N, T, s) = b is its balance, with forces in units of the weight and lateral forces
     S = shares @ s, which are s0 + s1 * position along the body where `shared`, else independent.
     """
-    placed, frames = place_rover(rover, prediction, i), contact_frames(rover, prediction, i)
+    placed = place_rover(rover, prediction, i)
+    frames = contact_frames(placed.axles, prediction.contact_angle[i])
     sums = []
     for kind in range(3):
         for wheel in range(6):
@@ -186,7 +182,7 @@ def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: in
     The whole width of the wheels of waypoint i is looked at, densely, then around the nearest
     points.
     """
-    wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
+    wheels = zip(prediction.wheel_centres[i], place_rover(rover, prediction, i).axles, strict=True)
     return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
 
 

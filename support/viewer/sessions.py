@@ -22,7 +22,8 @@ from support.paths import poses_at
 from support.rovers import LSR1
 from support.waiting import wait_until
 
-START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
+STRAIGHT = poses_at(np.linspace(-1.0, 1.0, 101))
+"""Poses along x."""
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
 SURE = PathQueryOptions(count=5, spacing=0.5, waypoint_spacing=0.05, accepted_chance=1.0)
@@ -30,11 +31,6 @@ SURE = PathQueryOptions(count=5, spacing=0.5, waypoint_spacing=0.05, accepted_ch
 time of a verdict."""
 PATIENCE = 120.0
 """Longest wait for a page [s]; drawing and judging take seconds on a busy machine."""
-
-
-def straight(length: float = 2.0, spacing: float = 0.02) -> np.ndarray:
-    """Return poses (n, 3) along x from x = -1 m, with a length and a spacing [m]."""
-    return poses_at(np.arange(-1.0, length - 1.0 + 1e-9, spacing))
 
 
 def ramp(x, y):

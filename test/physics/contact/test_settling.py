@@ -16,7 +16,7 @@ from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import STEERED, STRAIGHT, reference_predictions
 from support.rough_grounds import bouldered, fractal, plane, random_poses, rocky, smooth
-from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gap, wheel_gaps
+from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_gap, wheel_gaps
 from support.rovers import LSR1
 
 slopes = st.floats(-0.4, 0.4)
@@ -107,8 +107,8 @@ def test_999_of_1000_wheels_touch_within_a_tenth_of_a_millimetre_and_none_is_in_
     gaps = []
     for ground, prediction in rough_predictions(seeds):
         for k, i in enumerate(np.flatnonzero(prediction.settled)[::EVERY]):
-            centre, axis = prediction.wheel_centres[i, k % 6], wheel_axes(LSR1, prediction, i)
-            gaps.append(wheel_gap(LSR1, ground, centre, axis[k % 6]))
+            axis = place_rover(LSR1, prediction, i).axles[k % 6]
+            gaps.append(wheel_gap(LSR1, ground, prediction.wheel_centres[i, k % 6], axis))
     gaps = np.array(gaps)
     assert gaps.size >= 39 * seeds
     assert (np.abs(gaps) <= 1e-4).mean() >= 0.999
@@ -135,7 +135,7 @@ def test_no_rim_sinks_into_cells_twenty_times_as_large_as_the_wheel():
 @both_sets
 def test_contact_points_lie_on_the_wheels_and_on_the_ground(files, count):
     for case, prediction, i in waypoints_of(reference_predictions(files)):
-        points, axes = prediction.contact_points[i], wheel_axes(LSR1, prediction, i)
+        points, axes = prediction.contact_points[i], place_rover(LSR1, prediction, i).axles
         from_centre = points - prediction.wheel_centres[i]
         along = np.einsum("wk,wk->w", from_centre, axes)
         radial = np.linalg.norm(from_centre - along[:, None] * axes, axis=1)
