@@ -29,8 +29,7 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command.prediction_files import read_poses, write_prediction
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.grounds import make_terrain, waves
-from support.rough_grounds import bouldered
+from support.grounds import bouldered, make_terrain, waves
 
 REPEATS = 7
 """Repeats of a measurement."""

@@ -11,9 +11,8 @@ from statistics import median
 from benchmarks.measure import Figure
 from benchmarks.processes import SERVER, START_TIME, open_nodes
 from msg_adapters.elevation import terrain_to_point_cloud
-from support.grounds import make_terrain, wall_at, waves
+from support.grounds import make_terrain, wall_at, waves, with_std
 from support.planner_client import GOAL, START, PlannerClient
-from support.rough_grounds import with_std
 from support.waiting import wait_until
 
 MAPS = ((6.0, 0.05, 0.0), (6.0, 0.05, 0.001), (15.0, 0.02, 0.0), (15.0, 0.02, 0.001))

@@ -19,16 +19,8 @@ sync_api = pytest.importorskip(
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 """Programs that are tried, in this order."""
 PROGRAM = next(filter(None, map(shutil.which, NAMES)), None)
-ARGUMENTS = [
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-"""Options of the browser: WebGL without a graphics card, and no network requests."""
+ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+"""Options of the browser: WebGL without a graphics card."""
 LAPTOP = {"width": 1280, "height": 720}
 """Size of a laptop's window [px]."""
 SCALE = 0.1

@@ -10,9 +10,9 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.learning.drive_log import RATES, STEERING, SUSPENSION, TIME, TORQUES, YAW, X
 from rover_planner.learning.ground_learner import GroundLearner
+from support.grounds import plane
 from support.learning_drives import climb, row_of_plant
 from support.reference_drives import drive_ground
-from support.rough_grounds import plane
 
 SPEED = 0.06
 ROVER = replace(load_rover("lsr1"), nominal_speed=SPEED)

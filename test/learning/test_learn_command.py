@@ -12,8 +12,8 @@ from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.learning.drive_log import PITCH, ROLL, STEERING, SUSPENSION, TIME, TORQUES, X
 from support.command_line import assert_refused, predict_arguments
+from support.grounds import plane
 from support.learning_drives import NAMES, climb, write_csv
-from support.rough_grounds import plane
 from support.rovers import LSR1 as ROVER
 
 SLOPE = 0.3

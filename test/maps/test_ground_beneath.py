@@ -11,8 +11,7 @@ from rover_planner.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.living_map import LivingMap
 from rover_planner.planning.answering.map_keeper import MapKeeper
-from support.grounds import make_terrain, raised, waves
-from support.rough_grounds import smooth, with_std
+from support.grounds import make_terrain, raised, smooth, waves, with_std
 from support.rovers import LSR1, M2020
 
 SLOPE = make_terrain(lambda x, y: 0.2 * x - 0.15 * y + 3.0)

@@ -24,10 +24,10 @@ from rover_planner.nodes import ground_learner
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
 from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
+from support.grounds import plane
 from support.learning_drives import climb
 from support.messages import row_messages
 from support.ros_fixtures import RosRun, hear
-from support.rough_grounds import plane
 from support.rovers import LSR1
 from support.waiting import wait_until
 

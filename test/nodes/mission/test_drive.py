@@ -14,8 +14,7 @@ from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, Marke
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from support.grounds import make_terrain
-from support.rough_grounds import plane
+from support.grounds import make_terrain, plane
 from support.rovers import LSR1
 
 MAP = plane(0.0, 0.0, half=4.0)

@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from support.grounds import make_terrain
+from support.grounds import bouldered, fractal, make_terrain, plane, random_poses, rocky, smooth
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import STEERED, STRAIGHT, reference_predictions
-from support.rough_grounds import bouldered, fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_gap, wheel_gaps
 from support.rovers import LSR1
 

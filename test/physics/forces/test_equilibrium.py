@@ -14,8 +14,8 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.manipulator import link_points
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
+from support.grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.reference_cases import STEERED, STRAIGHT, reference_predictions
-from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import (
     attitude_of,
     balance_residuals,

@@ -25,10 +25,18 @@ from rover_physics.numerics import interruption
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits
-from support.grounds import gap, make_terrain, waves
+from support.grounds import (
+    gap,
+    make_terrain,
+    plane,
+    random_poses,
+    rocky,
+    scaled_for,
+    waves,
+    with_std,
+)
 from support.paths import poses_at
 from support.predictions import assert_same
-from support.rough_grounds import plane, random_poses, rocky, scaled_for, with_std
 from support.rover_geometry import place_rover
 from support.rovers import LSR1, M2020
 

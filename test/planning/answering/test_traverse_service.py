@@ -14,8 +14,7 @@ from rover_planner.planning.answering.search_watch import NewerMapError, SearchW
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
-from support.grounds import make_terrain, raised, wall_at, waves
-from support.rough_grounds import with_std
+from support.grounds import make_terrain, raised, wall_at, waves, with_std
 from support.rovers import LSR1
 from support.services import load_settings, make_service
 

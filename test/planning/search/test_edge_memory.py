@@ -11,9 +11,8 @@ from rover_planner.planning.path_query import PathQueryOptions, check_path
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.site import Site
-from support.grounds import make_terrain, waves
+from support.grounds import make_terrain, rocky, waves
 from support.predictions import assert_same
-from support.rough_grounds import rocky
 from support.rovers import LSR1
 
 OPTIONS = PathQueryOptions(accepted_chance=1.0)
