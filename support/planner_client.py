@@ -95,10 +95,6 @@ class PlannerClient(Node):
         """Publish joint positions."""
         self.send(self._joints, JointState(name=list(names), position=list(positions)))
 
-    def send_odometry(self, pose, height=0.0) -> None:
-        """Publish odometry of a level pose (3,)."""
-        self.send(self._odometry, odometry_at(pose, height))
-
     def can_traverse(self, start, goal) -> Path:
         """Ask for a plan between two poses (3,)."""
         return self.plan(stamped_pose(start, "map"), stamped_pose(goal, "map"))
@@ -146,9 +142,10 @@ class PlannerClient(Node):
         wait_until(lambda: self._has_all() and all(self.heard.values()), "all results")
         return answer, {topic: messages[-1] for topic, messages in self.heard.items()}
 
-    def stand(self, pose) -> None:
+    def stand(self, pose, height=0.0) -> None:
         """Publish odometry of a level pose (3,) from now on."""
-        self.create_timer(0.05, lambda: self._odometry.publish(odometry_at(pose)))
+        odometry = odometry_at(pose, height)
+        self.create_timer(0.05, lambda: self._odometry.publish(odometry))
 
     @property
     def silence(self) -> float:

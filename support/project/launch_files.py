@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Launch files without launch, which PyPI has not: what they start."""
 
-import contextlib
 import runpy
 import sys
-from collections.abc import Iterator
 from types import ModuleType, SimpleNamespace
 from typing import Any
 from unittest import mock
@@ -36,19 +34,12 @@ class Kept(SimpleNamespace):
         return context[self.given[0]]
 
 
-@contextlib.contextmanager
-def launch_modules() -> Iterator[None]:
-    """Put stand-ins for launch and launch_ros where imports look first."""
-    made = {name: ModuleType(name) for name in MODULES}
-    for name, classes in MODULES.items():
-        vars(made[name]).update({one: type(one, (Kept,), {}) for one in classes})
-    with mock.patch.dict(sys.modules, made):
-        yield
-
-
 def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
     """Run a launch file; return its arguments with defaults, its other actions and its names."""
-    with launch_modules():
+    made = {module: ModuleType(module) for module in MODULES}
+    for module, classes in MODULES.items():
+        vars(made[module]).update({one: type(one, (Kept,), {}) for one in classes})
+    with mock.patch.dict(sys.modules, made):
         names = runpy.run_path(str(TOP / "launch" / name))
     actions = names["generate_launch_description"]().given[0]
     declared = [action for action in actions if type(action).__name__ == "DeclareLaunchArgument"]

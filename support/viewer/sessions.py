@@ -116,17 +116,17 @@ wait_patiently = partial(wait_until, timeout=PATIENCE)
 """Returns the first true value of what a busy machine's page does late."""
 
 
-def is_at_rest(page: Any) -> bool:
-    """Return whether a page judges, paints and advises nothing, and shows what was found."""
-    if not any(work.progress for work in page.works):
-        ask(page, lambda: None)
-    return not any(work.progress for work in page.works)
-
-
 def wait_for_rest(page: Any) -> None:
-    """Wait until everything that is wanted is judged and shown."""
+    """Wait until everything that is wanted is judged, painted, advised and shown."""
     told = page.session
-    wait_patiently(lambda: (told.is_complete or told.refusal) and is_at_rest(page), "all of it")
+
+    def is_at_rest() -> bool:
+        if not any(work.progress for work in page.works):
+            ask(page, lambda: None)
+        is_done = told.is_complete or told.refusal
+        return bool(is_done) and not any(work.progress for work in page.works)
+
+    wait_patiently(is_at_rest, "all of it")
 
 
 @contextmanager
