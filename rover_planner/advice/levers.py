@@ -217,7 +217,7 @@ def _spacing(case: Case) -> float:
     """Return the distance of waypoints [m] of a path of its own, where it does not turn."""
     steps = np.diff(distance_along(case.poses))
     driven = steps[steps > 0.0]
-    return float(np.median(driven)) if len(driven) else case.spacing
+    return float(np.median(driven)) if len(driven) else case.site.options.waypoint_spacing
 
 
 def _with_path(change: Callable[[Case, JudgedCase, float], Any]) -> Callable[..., Case | None]:
@@ -273,7 +273,7 @@ def _disc(case: Case, refusal: JudgedCase) -> Any:
 def _lower_rock(case: Case, refusal: JudgedCase, depth: float) -> Case:
     disc, heights = _disc(case, refusal), case.terrain.elevation.copy()
     heights[disc] = np.minimum(heights[disc], np.nanmax(heights[disc]) - depth)
-    return replace(case, terrain=replace(case.terrain, elevation=heights))
+    return case.change_site(terrain=replace(case.terrain, elevation=heights))
 
 
 def _describe_rock(refusal: JudgedCase, depth: float, _now: float) -> str:
@@ -293,7 +293,7 @@ def _limit(row: Limit) -> Lever:
     def apply(case: Case, _refusal: JudgedCase, bound: float) -> Case:
         changed: dict[str, Any] = {row.reads: bound}
         limits = replace(case.rover.limits, **changed)
-        return replace(case, rover=replace(case.rover, limits=limits))
+        return case.change_site(rover=replace(case.rover, limits=limits))
 
     def words(_refusal: JudgedCase, bound: float, now: float) -> str:
         name = row.reads.replace("_", " ")

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rover_planner.errors import PlanningError
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.judge import PathJudge
 from rover_planner.viewer.state.background_work import BackgroundWork, WorkStep
 from rover_planner.viewer.state.judging import PATH, judge_steps
 from support.grounds import waves
@@ -155,7 +156,7 @@ def test_changes_add_up_and_no_old_path_is_chosen_while_others_are_planned(judge
     assert asked is session.wanted and session.is_complete
     assert asked.goal[:2] == (1.5, 0.5) and asked.rover.friction == 0.5
     assert asked.arm["arm_yaw"] == 0.3 and asked.options.model.soil == "dry_sand"
-    answer = answer_path_query(asked.rover, asked.terrain, asked.start, asked.goal, asked.options)
+    answer = PathJudge(asked.site).search(asked.start, asked.goal)
     assert [p.verdict for p in session.shown.paths] == [c.verdict for c in answer.candidates]
 
 

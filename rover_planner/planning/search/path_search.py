@@ -218,7 +218,7 @@ class _PathFinder:
         ground = None if settings.frontier else query.site.terrain
         self._goal = _check_end("goal", query.goal, ground)
         self._memory = memory or EdgeMemory()
-        self._judge = PathJudge(query.site, *self._memory.recall_poses(query.site))
+        self._judge = PathJudge(query.site, *self._memory.begin(query.site))
         cell = settings.cell or 0.25 * query.site.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
         self._radius = tightest_radius(query.site.rover)
@@ -353,7 +353,7 @@ class _PathFinder:
         """Return the search, with the estimates of the ground and the connections of the ends."""
         site, nodes = self._site, self._nodes
         rover, spacing = site.rover, site.options.waypoint_spacing
-        edges = self._memory.recall(site, nodes)
+        edges = self._memory.recall_edges(site, nodes)
         climb = steepest_climb(rover, site.options.model.friction or rover.friction)
         terrain = cut_out(site, nodes) if self._is_limited else site.terrain
         ground = estimate_ground(rover, terrain, nodes)

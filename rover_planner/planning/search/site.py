@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One rover on one map, with the options of its paths and what refuses them there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -18,7 +18,7 @@ class Site:
     """The rover."""
     terrain: Terrain
     """The ground, map frame."""
-    options: PathQueryOptions
+    options: PathQueryOptions = field(default_factory=PathQueryOptions)
     """Options of candidates and of the judgement of paths."""
     unobserved_check: UnobservedCheck = NONE_REFUSED
     """Refuses ground under the belly that was never seen."""

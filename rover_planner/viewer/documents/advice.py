@@ -9,7 +9,6 @@ from rover_planner.advice.advise import STOPPED, Advice, grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.planning.assumptions import assume
-from rover_planner.planning.search.site import Site
 from rover_planner.viewer.state.scenario import JudgedPath, Scenario
 
 PROMISED = 20.0
@@ -40,9 +39,7 @@ def seek_advice(advised: Advised) -> Iterator[Advised]:
     Raises:
         RoverError: The model refuses the path or an option.
     """
-    asked = advised.path.scenario
-    site = Site(asked.rover, asked.terrain, asked.options)
-    case = case_of(site, advised.path.poses)
+    case = case_of(advised.path.scenario.site, advised.path.poses)
     for found in grow_advice(case):
         yield replace(advised, advice=found)
 

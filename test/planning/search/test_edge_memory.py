@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics import Terrain
-from rover_planner.planning.path_query import PathQueryOptions, check_path
+from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.site import Site
@@ -42,8 +42,8 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
     options, memory, rng = OPTIONS.change(policy=policy), EdgeMemory(), np.random.default_rng(3)
     for _ in range(12):
         site = Site(LSR1, ground, options)
-        judge = PathJudge(site, *memory.recall_poses(site))
-        part, whole = judge.check(WAY), check_path(LSR1, ground, WAY, options)
+        judge = PathJudge(site, *memory.begin(site))
+        part, whole = judge.check(WAY), PathJudge(site).check(WAY)
         assert part.verdict == whole.verdict
         assert_same(part.prediction, whole.prediction)
         assert_same(part.prediction.between, whole.prediction.between)

@@ -10,7 +10,7 @@ import pytest
 
 from rover_physics import Terrain, judge_path, load_terrain
 from rover_planner.errors import PlanningError
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search import lattice_search, path_search, query
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.graph import ShortestPaths, edge_cost
@@ -56,7 +56,7 @@ def around():
 
 def test_a_way_that_passes_leads_to_the_goal_around_a_wall_that_refuses_all_candidates(around):
     question, answer, _ = around
-    assert not answer_path_query(LSR1, question.site.terrain, START, GOAL, OPTIONS).traversable
+    assert not PathJudge(question.site).search(START, GOAL).traversable
     assert answer.outcome == FOUND and not answer.reason
     assert 0.0 < answer.seconds_first <= answer.seconds < 60.0
     poses = answer.path.poses
