@@ -109,21 +109,6 @@ def test_equal_torques_are_equal_and_lateral_forces_linear_along_the_rover(seed)
         assert np.abs(left).max() <= 1e-9 * LSR1.weight
 
 
-# Torque and friction
-
-
-def test_torque_is_that_of_the_traction_and_utilisations_are_shares_of_their_limits():
-    for _, prediction in reference_predictions():
-        loads, shear = prediction.wheel_loads, np.hypot(prediction.tangential, prediction.lateral)
-        carried, torque = loads > 0.0, prediction.torque
-        assert torque == pytest.approx(LSR1.wheel.radius * prediction.tangential, abs=1e-12)
-        saturation = np.abs(torque) / LSR1.wheel.max_torque
-        assert prediction.torque_saturation == pytest.approx(saturation, abs=1e-12)
-        used = shear[carried] / (LSR1.friction * loads[carried])
-        assert prediction.friction_utilisation[carried] == pytest.approx(used)
-        assert np.isinf(prediction.friction_utilisation[~carried]).all()
-
-
 # Free forces: what torques change, and what no balance decides
 
 

@@ -33,10 +33,6 @@ POSE = np.zeros((1, 3))
 soils = st.sampled_from(SOFT)
 
 
-def with_droop(rover, droop):
-    return replace(rover, wheel=replace(rover.wheel, servo_droop=droop))
-
-
 def servos_at(rover, ground, poses, options, curvature):
     """Yield the SERVO at each pose that settles and drives."""
     model = pack_model(rover, ground, options)
