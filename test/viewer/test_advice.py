@@ -20,13 +20,12 @@ ENDS = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 OPTIONS = PathQueryOptions(count=1, waypoint_spacing=0.05)
 
 
-def slope(x, y):
-    return 0.3 * x
-
-
 @pytest.mark.parametrize(
     ("ground", "changes", "levers"),
-    [(slope, {"friction": 0.45}, {"policy", "friction"}), (rock_left, {}, {"shift", "curve"})],
+    [
+        (lambda x, y: 0.3 * x, {"friction": 0.45}, {"policy", "friction"}),
+        (rock_left, {}, {"shift", "curve"}),
+    ],
 )
 def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers):
     rover = replace(LSR1, **changes)

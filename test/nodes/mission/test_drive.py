@@ -17,8 +17,7 @@ from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.site import Site
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from support.grounds import make_terrain
-from support.rough_grounds import plane
+from support.grounds import make_terrain, plane
 from support.rovers import LSR1
 
 MAP = plane(0.0, 0.0, half=4.0)

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, Terrain, find_torque_ranges, judge_path, judge_poses
 from support.best_torques import INSIDE, can_stand, solve_forces
-from support.reference_cases import reference_ground
-from support.rough_grounds import (
+from support.grounds import (
     RESOLUTION,
     fractal,
     plane,
@@ -20,6 +19,7 @@ from support.rough_grounds import (
     scaled_for,
     smooth,
 )
+from support.reference_cases import reference_ground
 from support.rover_geometry import balance_matrix
 from support.rovers import LSR1, M2020
 
