@@ -31,8 +31,7 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.site import Site
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.grounds import make_terrain, waves
-from support.rough_grounds import bouldered
+from support.grounds import bouldered, make_terrain, waves
 
 REPEATS = 7
 """Repeats of a measurement."""

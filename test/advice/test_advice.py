@@ -21,8 +21,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.search.site import Site
-from support.grounds import make_terrain, rock_left
-from support.rough_grounds import enlarged
+from support.grounds import enlarged, make_terrain, rock_left
 from support.rovers import FIXED, LSR1, M2020, similar
 
 S = np.arange(-1.5, 1.6, 0.05)

@@ -9,7 +9,7 @@ pytest.importorskip("matplotlib", reason="needs matplotlib")
 from rover_physics import judge_path
 from rover_planner.cli import main
 from rover_planner.figures.figure4 import HELD, load_changes, loads_under_torque
-from support.rough_grounds import plane
+from support.grounds import plane
 from support.rover_geometry import balance_matrix, turned_round
 from support.rovers import LSR1, M2020
 

@@ -11,8 +11,8 @@ from rover_planner.command.prediction_files import read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import read_assumptions
 from support.command_line import N, assert_refused, predict_arguments, write_ground_and_path
+from support.grounds import with_std
 from support.paths import poses_at
-from support.rough_grounds import with_std
 
 
 def by_name(table):

@@ -12,7 +12,8 @@ from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.learning.drive_log import PITCH, ROLL, STEERING, SUSPENSION, TIME, TORQUES, X
 from support.command_line import assert_refused, predict_arguments
-from support.learning_drives import NAMES, climb, ramp, write_csv
+from support.grounds import plane
+from support.learning_drives import NAMES, climb, write_csv
 from support.rovers import LSR1 as ROVER
 
 SLOPE = 0.3
@@ -21,7 +22,7 @@ SLOPE = 0.3
 @pytest.fixture
 def folder(tmp_path):
     """Return a folder with a terrain and a drive on it."""
-    save_terrain(tmp_path / "ramp.npz", ramp(SLOPE))
+    save_terrain(tmp_path / "ramp.npz", plane(SLOPE, 0.0, half=3.0))
     write_csv(tmp_path / "drive.csv", climb(ROVER, SLOPE, 8.0))
     return tmp_path
 

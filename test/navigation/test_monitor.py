@@ -21,8 +21,7 @@ from rover_planner.planning.navigation.monitor import (
 )
 from rover_planner.planning.navigation.watched_path import USUAL_RADIUS, WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
-from support.grounds import make_terrain, wall_at, waves
-from support.rough_grounds import with_std
+from support.grounds import make_terrain, wall_at, waves, with_std
 from support.services import make_service
 
 STRAIGHT = np.column_stack([np.linspace(-2.0, 2.0, 201), np.zeros(201), np.zeros(201)])

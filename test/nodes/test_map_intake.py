@@ -12,7 +12,7 @@ from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.map_intake import MapIntake, are_gridded_alike
-from support.rough_grounds import plane
+from support.grounds import plane
 from support.rovers import LSR1
 from support.waiting import wait_until
 

@@ -14,16 +14,14 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.viewer.state.background_work import BackgroundWork, WorkStep
 from rover_planner.viewer.state.judging import PATH, judge_steps
-from rover_planner.viewer.state.scenario import Scenario
-from support.grounds import make_terrain, waves
-from support.rovers import LSR1
-from support.viewer.sessions import GOAL, START, Judge, ramp, session_on
+from support.grounds import waves
+from support.viewer.sessions import Judge, ramp, session_on
 from support.waiting import wait_until
 
 STOP_TIME = 2.0
 """Longest time until work stops [s]; most steps take 0.05 s, few 0.4 s."""
 MANY = PathQueryOptions(count=3, spacing=0.2, waypoint_spacing=5e-5)
-SLOW = Scenario(LSR1, LSR1, make_terrain(waves), START, GOAL, MANY)
+SLOW = session_on(waves, options=MANY).wanted
 """Three paths with so many waypoints that each takes a while."""
 
 

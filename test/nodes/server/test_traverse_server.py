@@ -116,7 +116,7 @@ def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, las
     server, client = shared.server, shared.client
     client.send_joints(["camera", "rocker_left"], [math.nan, 0.5])
     wait_until(lambda: server.service.joints, "the joints")
-    client.send_odometry((-0.5, 0.0, 0.0))
+    client.stand((-0.5, 0.0, 0.0))
     standing = server.service.snapshot
     wait_until(lambda: standing().measured_pose is not None, "the odometry")
     answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))

@@ -71,7 +71,7 @@ def test_bad_requests_maps_and_paths_are_refused_with_their_reason_and_the_node_
     assert verdict["code"] == "no_path" and "path is in frame 'odom'" in verdict["reason"]
     client.send_path(poses_path(np.zeros((1501, 3)), "map"))
     client.wait_for_log("path has 1501 poses; it may have 1500")
-    assert server.service.known_map.fingerprint == before and shared.ros.is_alive(server)
+    assert server.service.known_map.fingerprint == before
     assert client.can_traverse(START, GOAL).poses
 
 

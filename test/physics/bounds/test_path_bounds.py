@@ -17,10 +17,9 @@ from rover_physics import Rover, SweepOptions, Terrain, judge_path
 from rover_physics.errors import ModelError
 from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.status import BoundStatus
-from support.grounds import make_terrain
+from support.grounds import RESOLUTION, fractal, make_terrain, plane, rocky, with_std
 from support.paths import arc_of, poses_at
 from support.reference_drives import drive_ground
-from support.rough_grounds import RESOLUTION, fractal, plane, rocky, with_std
 from support.rovers import LSR1, M2020
 
 ROUNDING = 1e-6

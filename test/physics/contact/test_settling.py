@@ -11,19 +11,25 @@ from hypothesis import strategies as st
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from support.grounds import make_terrain, raised
+from support.grounds import (
+    bouldered,
+    fractal,
+    make_terrain,
+    plane,
+    raised,
+    random_poses,
+    rocky,
+    smooth,
+)
 from support.paths import poses_at
 from support.project.checkout import TOP
-from support.reference_cases import reference_predictions, steered_predictions
-from support.rough_grounds import bouldered, fractal, plane, random_poses, rocky, smooth
-from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gap, wheel_gaps
+from support.reference_cases import STEERED, STRAIGHT, reference_predictions
+from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_gap, wheel_gaps
 from support.rovers import LSR1
 
 slopes = st.floats(-0.4, 0.4)
 both_sets = pytest.mark.parametrize(
-    ("predict", "count"),
-    [(reference_predictions, 81), (steered_predictions, 21)],
-    ids=["straight", "turned"],
+    ("files", "count"), [(STRAIGHT, 81), (STEERED, 21)], ids=["straight", "turned"]
 )
 
 
@@ -34,11 +40,9 @@ def waypoints_of(predictions):
 
 
 @both_sets
-def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_them(
-    predict, count
-):
+def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_them(files, count):
     errors, angles = [], []
-    for case, prediction in predict():
+    for case, prediction in reference_predictions(files):
         assert prediction.settled.all(), case.label
         away = prediction.wheel_centres - case.wheel_centres
         errors.append(np.linalg.norm(away, axis=2).ravel())
@@ -52,7 +56,7 @@ def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_t
 
 
 def test_turned_wheels_touch_by_an_independent_dense_look_over_their_whole_width():
-    cases = list(waypoints_of(steered_predictions()))[::4]  # a look takes long
+    cases = list(waypoints_of(reference_predictions(STEERED)))[::4]  # a look takes long
     gaps = np.concatenate([wheel_gaps(LSR1, case.terrain, p, i) for case, p, i in cases])
     assert gaps.size == 36
     assert gaps.max() <= 3e-4 and gaps.min() >= -1e-3
@@ -110,8 +114,8 @@ def test_999_of_1000_wheels_touch_within_a_tenth_of_a_millimetre_and_none_is_in_
     gaps = []
     for ground, prediction in rough_predictions(seeds):
         for k, i in enumerate(np.flatnonzero(prediction.settled)[::EVERY]):
-            centre, axis = prediction.wheel_centres[i, k % 6], wheel_axes(LSR1, prediction, i)
-            gaps.append(wheel_gap(LSR1, ground, centre, axis[k % 6]))
+            axis = place_rover(LSR1, prediction, i).axles[k % 6]
+            gaps.append(wheel_gap(LSR1, ground, prediction.wheel_centres[i, k % 6], axis))
     gaps = np.array(gaps)
     assert gaps.size >= 39 * seeds
     assert (np.abs(gaps) <= 1e-4).mean() >= 0.999
@@ -136,9 +140,9 @@ def test_no_rim_sinks_into_cells_twenty_times_as_large_as_the_wheel():
 
 
 @both_sets
-def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
-    for case, prediction, i in waypoints_of(predict()):
-        points, axes = prediction.contact_points[i], wheel_axes(LSR1, prediction, i)
+def test_contact_points_lie_on_the_wheels_and_on_the_ground(files, count):
+    for case, prediction, i in waypoints_of(reference_predictions(files)):
+        points, axes = prediction.contact_points[i], place_rover(LSR1, prediction, i).axles
         from_centre = points - prediction.wheel_centres[i]
         along = np.einsum("wk,wk->w", from_centre, axes)
         radial = np.linalg.norm(from_centre - along[:, None] * axes, axis=1)

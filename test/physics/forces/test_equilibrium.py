@@ -14,8 +14,8 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.manipulator import link_points
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
-from support.reference_cases import reference_predictions, steered_predictions
-from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
+from support.grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
+from support.reference_cases import STEERED, STRAIGHT, reference_predictions
 from support.rover_geometry import (
     attitude_of,
     balance_residuals,
@@ -34,16 +34,16 @@ few = settings(max_examples=10)
 # Against the reference
 
 
-@pytest.mark.parametrize("predict", [reference_predictions, steered_predictions])
-def test_the_forces_on_the_wheels_are_those_of_mujoco(predict):
+@pytest.mark.parametrize("files", [STRAIGHT, STEERED])
+def test_the_forces_on_the_wheels_are_those_of_mujoco(files):
     errors = []
-    for case, prediction in predict():
+    for case, prediction in reference_predictions(files):
         parts = [prediction.wheel_loads, prediction.tangential, prediction.lateral]
         size = np.linalg.norm(parts, axis=0)
         errors.append(np.abs(size - np.linalg.norm(case.forces, axis=2)).ravel())
     errors = np.concatenate(errors) / LSR1.weight
     assert np.median(errors) <= 0.005
-    if predict is reference_predictions:  # dropped on turned wheels, they hold one another
+    if files == STRAIGHT:  # dropped on turned wheels, they hold one another
         assert errors.size == 81 * 6
         assert np.percentile(errors, 95) <= 0.015
 

@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, find_torque_ranges, judge_path, judge_poses
 from support.best_torques import INSIDE, can_stand, solve_forces
-from support.grounds import make_terrain
-from support.reference_cases import reference_ground
-from support.rough_grounds import (
+from support.grounds import (
     RESOLUTION,
     fractal,
+    make_terrain,
     plane,
     random_poses,
     rocky,
     scaled_for,
     smooth,
 )
+from support.reference_cases import reference_ground
 from support.rover_geometry import balance_matrix
 from support.rovers import LSR1, M2020
 

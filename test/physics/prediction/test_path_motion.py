@@ -14,9 +14,8 @@ from rover_physics.names import TORQUE_POLICIES
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.traversability.judge import PartwiseJudge
-from support.grounds import make_terrain
+from support.grounds import make_terrain, plane, random_poses
 from support.paths import arc_of, poses_at
-from support.rough_grounds import plane, random_poses
 from support.rovers import ALL_STEER, FIXED, LSR1, M2020
 
 LEVEL = Terrain(np.zeros((401, 401)), 0.02, (-4.0, -4.0))

@@ -8,8 +8,8 @@ import pytest
 
 from rover_physics import SweepOptions, Terrain, judge_path
 from rover_physics.forces.soil import SoilWheel, effective_friction, pack_soils, solve_wheel
+from support.grounds import plane, random_poses, smooth
 from support.paths import poses_at
-from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import turned_round
 from support.rovers import LSR1
 

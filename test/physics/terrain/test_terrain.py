@@ -17,8 +17,7 @@ from rover_physics import Terrain, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
 from rover_physics.terrain.ground import BLOCK, friction_at, height_inside, pack_ground
 from rover_physics.terrain.terrain_file import terrain_presets
-from support.grounds import raised
-from support.rough_grounds import plane
+from support.grounds import plane, raised
 
 
 @given(

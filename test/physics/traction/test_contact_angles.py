@@ -8,10 +8,9 @@ from rover_physics.errors import ModelError
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import MotionContactEstimator
 from rover_physics.traction.map_contacts import MapContactFinder
-from support.grounds import raised
+from support.grounds import fractal, plane, raised, rocky
 from support.paths import arc_of, poses_at
 from support.reference_drives import drive_ground
-from support.rough_grounds import fractal, plane, rocky
 from support.rover_geometry import turned_round
 from support.rovers import LSR1, M2020
 from support.traction_states import drive_states, state_of

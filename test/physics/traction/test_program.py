@@ -13,7 +13,7 @@ from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from support.best_torques import can_stand
-from support.rough_grounds import fractal, plane, random_poses
+from support.grounds import fractal, plane, random_poses
 from support.rover_geometry import balance_matrix, place_rover
 from support.rovers import LSR1, M2020
 from support.traction_states import state_of

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path
-from support.grounds import make_terrain
+from support.grounds import bowl, make_terrain
 from support.paths import poses_at
 from support.reference_drives import drive_ground
-from support.rough_grounds import bowl
 from support.rovers import LSR1
 
 DEEP_DROPS = replace(LSR1, limits=replace(LSR1.limits, wheel_drop=1.0))

@@ -28,9 +28,8 @@ from rover_physics.prediction.sweep import predict_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from rover_planner.planning.path_query import Candidate
-from support.grounds import raised
+from support.grounds import plane, raised, with_std
 from support.paths import poses_at
-from support.rough_grounds import plane, with_std
 from support.rovers import LSR1
 
 POSES = poses_at(np.linspace(-0.2, 0.2, 5))

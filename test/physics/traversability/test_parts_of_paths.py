@@ -16,11 +16,10 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure
 from rover_physics.traversability.verdict import hold_against_limits
-from support.grounds import make_terrain
+from support.grounds import bouldered, bowl, fractal, make_terrain, rocky, scaled_for, with_std
 from support.paths import arc_of, poses_at
 from support.predictions import assert_same
 from support.reference_drives import drive_ground, drive_path
-from support.rough_grounds import bouldered, bowl, fractal, rocky, scaled_for, with_std
 from support.rovers import LSR1 as ROVER
 
 GROUND = bouldered(3, half=6.0, count=600)

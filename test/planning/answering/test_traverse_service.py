@@ -14,8 +14,7 @@ from rover_planner.planning.answering.search_watch import NewerMapError, SearchW
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
-from support.grounds import make_terrain, raised, rocky, wall_at, waves
-from support.rough_grounds import with_std
+from support.grounds import make_terrain, raised, wall_at, waves, with_std
 from support.rovers import LSR1
 from support.services import load_settings, make_service
 
@@ -141,7 +140,7 @@ def test_an_impossible_tolerance_is_refused():
 
 
 def test_the_measured_suspension_is_compared_with_the_predicted_one_where_the_rover_stands():
-    service = make_service(make_terrain(rocky))
+    service = make_service(make_terrain(waves))
     service.given_path = GivenPath(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]), "")
     free = service.snapshot().check_path()
     assert free.suspension is None and "suspension_mismatch" not in free.report.to_dict()

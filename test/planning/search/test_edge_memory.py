@@ -9,9 +9,8 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.site import Site
-from support.grounds import make_terrain, raised, waves
+from support.grounds import make_terrain, raised, rocky, waves
 from support.predictions import assert_same
-from support.rough_grounds import rocky
 from support.rovers import LSR1
 
 OPTIONS = PathQueryOptions(accepted_chance=1.0)

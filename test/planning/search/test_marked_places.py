@@ -33,9 +33,8 @@ from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSE
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
-from support.grounds import make_terrain
+from support.grounds import make_terrain, plane
 from support.paths import poses_at
-from support.rough_grounds import plane
 from support.services import make_service
 
 PLACE = MarkedPlace(1.5, 0.0, 0.4, "wheels turn and the rover stays", "2026-11-25 04:00:00 UTC")

@@ -28,9 +28,8 @@ from rover_planner.planning.search.path_search import (
 from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
-from support.grounds import make_terrain, pen, raised, waves
+from support.grounds import fractal, make_terrain, pen, plane, raised, rocky, waves
 from support.paths import poses_at
-from support.rough_grounds import fractal, plane, rocky
 from support.rovers import LSR1
 from support.services import load_settings
 

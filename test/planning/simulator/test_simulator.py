@@ -19,9 +19,8 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation
-from support.grounds import make_terrain, waves
+from support.grounds import enlarged, make_terrain, plane, rocky, waves
 from support.paths import arc_of, poses_at
-from support.rough_grounds import enlarged, plane, rocky
 from support.rovers import FIXED, LSR1, similar
 
 STEP, SPEED = 0.02, 0.06
