@@ -11,16 +11,7 @@ from hypothesis import strategies as st
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from support.grounds import (
-    bouldered,
-    fractal,
-    make_terrain,
-    plane,
-    raised,
-    random_poses,
-    rocky,
-    smooth,
-)
+from support.grounds import bouldered, fractal, plane, raised, random_poses, rocky, smooth
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import STEERED, STRAIGHT, reference_predictions
@@ -169,11 +160,9 @@ def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw)
     assert foot[2] == pytest.approx(slope_x * foot[0] + slope_y * foot[1] + height, abs=2.0 * GAP)
 
 
-def known_to_the_left_of(edge: float) -> Terrain:
-    return make_terrain(lambda x, y: np.where(x > edge, np.nan, 0.0), 0.04, 1.2)
-
-
 LEVEL = plane(0.0, 0.0)
+LEFT = raised(LEVEL, np.s_[:, 46:], np.nan)
+"""Ground that is known up to x = 0.6."""
 REACH = LEVEL.bounds[1] - 0.5
 """Where the front wheels touch the last cell of the map."""
 
@@ -181,9 +170,9 @@ REACH = LEVEL.bounds[1] - 0.5
 @pytest.mark.parametrize(
     ("ground", "x", "status"),
     [
-        (known_to_the_left_of(0.6), 0.0, PoseStatus.SETTLED),
-        (known_to_the_left_of(0.6), 0.3, PoseStatus.UNKNOWN_GROUND),
-        (known_to_the_left_of(1.0), 0.95, PoseStatus.OFF_MAP),  # comes before unknown ground
+        (LEFT, 0.0, PoseStatus.SETTLED),
+        (LEFT, 0.3, PoseStatus.UNKNOWN_GROUND),
+        (LEFT, 0.95, PoseStatus.OFF_MAP),  # comes before unknown ground
         (LEVEL, REACH - 0.001, PoseStatus.SETTLED),
         (LEVEL, REACH + 0.001, PoseStatus.OFF_MAP),
         (LEVEL, 40.0, PoseStatus.OFF_MAP),
