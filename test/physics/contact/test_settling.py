@@ -172,7 +172,8 @@ REACH = LEVEL.bounds[1] - 0.5
     [
         (LEFT, 0.0, PoseStatus.SETTLED),
         (LEFT, 0.3, PoseStatus.UNKNOWN_GROUND),
-        (LEFT, 0.95, PoseStatus.OFF_MAP),  # comes before unknown ground
+        # Off the map comes before unknown ground.
+        (raised(LEVEL, np.s_[:, 56:], np.nan), 0.95, PoseStatus.OFF_MAP),
         (LEVEL, REACH - 0.001, PoseStatus.SETTLED),
         (LEVEL, REACH + 0.001, PoseStatus.OFF_MAP),
         (LEVEL, 40.0, PoseStatus.OFF_MAP),
