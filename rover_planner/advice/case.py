@@ -83,7 +83,7 @@ class Case:
             stop_at_failure=True,
             accepted_chance=self.site.options.accepted_chance,  # 1, too: the chance is told
         )
-        path = self.site.hold(Candidate(self.poses, *judged))
+        path = self.site.refuse_ground(Candidate(self.poses, *judged))
         return JudgedCase(self, path.prediction, path.verdict)
 
     def predict(self) -> PathPrediction:

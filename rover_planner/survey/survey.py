@@ -14,7 +14,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob
 from rover_planner.survey.dask_cluster import ClusterSettings, check_machine
 from rover_planner.survey.geotiff import BAND, GeoTiffMap, is_geotiff
-from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED
+from rover_planner.survey.layers import NOT_SURVEYED
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
 from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.request import SurveyRequest
@@ -99,8 +99,8 @@ def summarise(store: SurveyStore) -> dict[str, Any]:
     surveyed = cells - int(counts["best_class"][NOT_SURVEYED])
     shares = {
         name: {
-            which: round(int(count[CLASS_NUMBERS[which]]) / max(surveyed, 1), 6)
-            for which in TRAVERSABILITY_CLASSES
+            which: round(int(count[number]) / max(surveyed, 1), 6)
+            for number, which in enumerate(TRAVERSABILITY_CLASSES)
         }
         for name, count in counts.items()
     }

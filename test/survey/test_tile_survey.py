@@ -9,9 +9,8 @@ import pytest
 pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics import SweepOptions, Terrain, judge_poses
-from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
+from rover_physics.traversability.pose_classes import IMPASSABLE, RoverOnMap, classify_poses
 from rover_planner.survey.layers import (
-    CLASS_NUMBERS,
     NO_LIMIT,
     list_layers,
     number_limits,
@@ -89,7 +88,7 @@ def test_limits_and_classes_are_those_of_predict(ground, policy, std):
     limits = np.array([number_limits()[code] for code in verdict.codes])
     np.testing.assert_array_equal(layers["first_limit"][clear], limits[clear])
     classes = classify_poses(RoverOnMap(TOP_HEAVY, ground, request.options), poses)
-    classes[classes < 0] = CLASS_NUMBERS["impassable"]  # ground that was not seen
+    classes[classes < 0] = IMPASSABLE  # ground that was not seen
     np.testing.assert_array_equal(layers["best_class"][clear], classes[clear])
     assert clear.any() and not clear.all()
     if std is None:
@@ -171,7 +170,7 @@ def test_no_cell_passes_whose_outline_touches_unknown_ground():
 
 def test_ground_that_is_all_unknown_is_impassable():
     layers = survey_tile(make_request(turns=True), None, np.zeros((5, 2)))
-    assert (layers["best_class"] == CLASS_NUMBERS["impassable"]).all()
+    assert (layers["best_class"] == IMPASSABLE).all()
     assert (layers["first_limit"] == number_limits()["unknown_ground"]).all()
     assert not layers["passable_headings"].any() and np.isnan(layers["worst_tilt"]).all()
     listed = list_layers(4, True, False)

@@ -49,9 +49,9 @@ class GivenPath:
     code: str = "no_path"
     """Code of the refusal."""
 
-    def judge(self, known: "Snapshot") -> PathJudgement:
+    def judge(self, snapshot: "Snapshot") -> PathJudgement:
         """Judge whether the rover can drive it; errors are those of `Snapshot.check_path`."""
-        return replace(known, path=self).check_path().complete()
+        return replace(snapshot, path=self).check_path().complete()
 
 
 @dataclass(frozen=True, eq=False)

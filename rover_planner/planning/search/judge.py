@@ -33,7 +33,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
 from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
 from rover_physics.traversability.pieces import PieceVerdict, find_exposure, judge_pieces
-from rover_physics.traversability.verdict import Verdict
+from rover_physics.traversability.verdict import Verdict, with_refusals
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_geometry import rings_within
@@ -46,7 +46,6 @@ from rover_planner.planning.path_query import (
 )
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 from rover_planner.planning.search.site import Site
-from rover_planner.planning.search.unobserved_check import physical
 
 CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""
@@ -137,8 +136,8 @@ class PathJudge:
             )
         if not answer.traversable:
             return answer
-        held = self._choose_by_chance([site.hold(candidate) for candidate in answer.candidates])
-        return held if held.traversable else replace(held, choice=answer.choice)
+        allowed = self._choose_by_chance([*map(site.refuse_ground, answer.candidates)])
+        return allowed if allowed.traversable else replace(allowed, choice=answer.choice)
 
     def _choose_by_chance(self, candidates: list[Candidate]) -> PathAnswer:
         """Choose the passing candidate with the lowest cost whose chance of failure is accepted.
@@ -176,8 +175,9 @@ class PathJudge:
         """
         for ring in rings_within(start, goal, tolerance, self.site.rover.wheel.radius):
             reached = np.array(ring)[~self.site.marked.refuses_ends(start, np.array(ring))]
-            judged = ((pose, self.site.hold(self._judge_path(pose[None, :]))) for pose in reached)
-            yield (pose for pose, one in judged if one.verdict.traversable)
+            judged = map(self._judge_path, reached[:, None, :])
+            allowed = zip(reached, map(self.site.refuse_ground, judged), strict=True)
+            yield (pose for pose, path in allowed if path.verdict.traversable)
 
     def check(self, poses: NDArray[np.float64], *, stop_at_failure: bool = False) -> Candidate:
         """Judge one given path of poses (n, 3).
@@ -190,7 +190,7 @@ class PathJudge:
             RoverError: The model refuses an option or the poses.
         """
         self.asked_poses += len(poses)
-        return self.site.hold(self._judge_path(poses, stop_at_failure=stop_at_failure))
+        return self.site.refuse_ground(self._judge_path(poses, stop_at_failure=stop_at_failure))
 
     def _judge_path(
         self, poses: NDArray[np.float64], *, stop_at_failure: bool = False
@@ -212,30 +212,32 @@ class PathJudge:
 
     def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
         """Return the class of each waypoint of a judged path; may evaluate the path once more."""
-        site = self.site
-        judged = physical(candidate)
+        site, verdict = self.site, candidate.verdict
+        if {UNOBSERVED_CODE, MARKED_CODE} & set(verdict.codes):  # which the model passes
+            none = [""] * len(verdict.codes)
+            verdict = with_refusals(verdict, none, none)
         return classify_judged(
             site.rover,
             site.terrain,
-            judged.prediction,
-            judged.verdict,
+            candidate.prediction,
+            verdict,
             site.options.model,
             sigmas=site.options.map_sigmas,
         )
 
     @cached_property
     def _cautious(self) -> tuple[Terrain, SweepOptions]:
-        """Ground and options for pieces of path: as told, or such that their chance is accepted.
+        """Ground and options for pieces of path, such that their chance is accepted.
 
         With the friction and the torque limit below which they are with the accepted chance,
         pieces need no samples; the whole path gets them.
         """
-        terrain, options, told = self.site.terrain, self.site.options, self.site.rover
+        terrain, options, rover = self.site.terrain, self.site.options, self.site.rover
         accepted, model = options.asked_chance, options.model
         if accepted is None:
             return terrain, model
         low = min(NormalDist().inv_cdf(max(accepted, LEAST_CHANCE)), 0.0)
-        off = told.uncertainty
+        off = rover.uncertainty
         friction, torque = (
             max(1.0 + low * math.hypot(std, off.model), LEAST_SHARE)
             for std in (off.friction, off.max_torque)
@@ -244,9 +246,9 @@ class PathJudge:
         ground = terrain if layer is None else replace(terrain, friction=friction * layer)
         return ground, replace(
             model,
-            friction=friction * (told.friction if model.friction is None else model.friction),
+            friction=friction * (rover.friction if model.friction is None else model.friction),
             max_torque=torque
-            * (told.wheel.max_torque if model.max_torque is None else model.max_torque),
+            * (rover.wheel.max_torque if model.max_torque is None else model.max_torque),
         )
 
     def judge_pieces(self, pieces: Sequence[Piece]) -> list[JudgedPiece]:

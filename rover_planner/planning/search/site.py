@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
+from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
+from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.unobserved_check import NONE_REFUSED, UnobservedCheck
 
@@ -28,6 +29,14 @@ class Site:
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", self.options.fit(self.rover))
 
-    def hold(self, path: Candidate) -> Candidate:
-        """Return a path, refused where its ground was never seen or is marked."""
-        return self.marked.hold(self.unobserved_check.hold(self.rover, path))
+    def refuse_ground(self, path: Candidate) -> Candidate:
+        """Return a path as the model judged it, refused where its ground is unseen or marked."""
+        if not path.verdict.traversable:
+            return path
+        unseen = self.unobserved_check.find(self.rover, path.poses)
+        if unseen is not None:
+            return path.refuse_at(unseen[0], UNOBSERVED_CODE, unseen[1])
+        entered = self.marked.find(path.poses)
+        if entered is not None:
+            return path.refuse_at(entered[0], MARKED_CODE, entered[1].describe())
+        return path

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive goes on where its rover is held up, and ends where nothing helps."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -44,9 +45,8 @@ class SimulatedRover:
         self.follower = self.make_follower(poses, 0.3)
 
     def check(self, poses):
-        candidate = JUDGE.check(poses)
-        held = self.marked.hold(candidate).verdict
-        return Answer(held.traversable, True, held.code, held.reason, poses, {})
+        verdict = PathJudge(replace(JUDGE.site, marked=self.marked)).check(poses).verdict
+        return Answer(verdict.traversable, True, verdict.code, verdict.reason, poses, {})
 
     def has_ended(self):
         return self.follower.has_arrived(self.plant.pose()) if self.speaks else None
