@@ -9,7 +9,7 @@ import pytest
 from rover_physics import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
-from rover_planner.maps.changes import find_changes, have_same_layers
+from rover_planner.maps.changes import find_changes
 from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto
 from rover_planner.parameters.traverse_server import SUREST, TraverseServerParameters
 from rover_planner.planning.answering.living_map import LivingMap
@@ -243,19 +243,3 @@ def test_a_cell_of_any_layer_that_differs_is_found(layer, value):
     assert found.shape == (14, 17) and np.argwhere(found).tolist() == [[8, 3]]
     back = find_changes(replace(ground(), **{layer: values}), ground())
     assert np.argwhere(back).tolist() == [[8, 3]]
-
-
-def test_in_a_window_that_moved_only_new_cells_and_the_edge_differ():
-    whole = np.random.default_rng(1).standard_normal((20, 30))
-    old, new = Terrain(whole[2:14, 5:20], 0.1), Terrain(whole[4:16, 2:17], 0.1)
-    is_new = np.ones((14, 17), bool)
-    is_new[1:11, 4:16] = False
-    np.testing.assert_array_equal(find_changes(old, new, (2, -3)), is_new)
-
-
-def test_layers_and_soils_must_be_the_same():
-    assert have_same_layers(ground(), ground(5))
-    assert not have_same_layers(ground(), replace(ground(), friction=None))
-    soil = np.zeros((12, 15), np.int32)
-    sand = replace(ground(), soil=soil, soil_names=("mars_simulant",))
-    assert not have_same_layers(ground(), sand)

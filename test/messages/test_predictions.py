@@ -122,25 +122,20 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
 
 
 def test_every_entry_of_a_verdict_becomes_a_key_and_a_value():
-    entries = {
-        "traversable": False,
-        "code": "tilt",
-        "first_failure": 7,
-        "mismatch": {"rocker_left": 0.25},
-        "goal": [1.0, None],
+    told = {
+        "traversable": (False, "false"),
+        "code": ("tilt", "tilt"),
+        "mismatch": ({"rocker_left": 0.25}, '{"rocker_left": 0.25}'),
+        "goal": ([1.0, None], "[1.0, null]"),
     }
+    entries = {key: value for key, (value, _) in told.items()}
     message = verdict_to_diagnostics("error", "tilt 0.6 rad", entries, "lsr1", HEADER)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
     (status,) = message.status
     assert status.level == DiagnosticStatus.ERROR and status.message == "tilt 0.6 rad"
     assert status.hardware_id == "lsr1" and status.name
-    assert {entry.key: entry.value for entry in status.values} == {
-        "traversable": "false",
-        "code": "tilt",
-        "first_failure": "7",
-        "mismatch": '{"rocker_left": 0.25}',
-        "goal": "[1.0, null]",
-    }
+    values = {entry.key: entry.value for entry in status.values}
+    assert values == {key: text for key, (_, text) in told.items()}
 
 
 @pytest.mark.parametrize("number", [math.nan, -math.inf])

@@ -31,24 +31,20 @@ def test_turns_on_the_spot_before_a_failure_are_no_distance():
     drive = np.column_stack([np.linspace(0.0, 2.0, 60), np.zeros((60, 2))])
     wall = make_terrain(lambda x, y: np.where(x > 1.3, 1.0, 0.0))
     refused = PathJudge(Site(LSR1, wall)).check(np.concatenate([turn, drive]))
-    assert refused.passable_length == pytest.approx(
-        drive[refused.verdict.first_failure - 60, 0], abs=1e-9
-    )
+    failure = drive[refused.verdict.first_failure - 60]
+    assert refused.passable_length == pytest.approx(failure[0], abs=1e-9)
 
 
 def test_the_safer_path_wins_and_energy_decides_between_equals():
     answer = PathJudge(Site(LSR1, FLAT, COARSE)).search((-2, 0, 0), (2, 0, 0))
     assert answer.choice == 0 and "5 of 5" in answer.explain()  # straight ahead
-    risky, safe, thrifty = (
-        replace(
-            one,
-            prediction=one.prediction.change(energy=np.full(len(one.poses), energy)),
-            verdict=replace(one.verdict, risk=risk),
-        )
-        for one, risk, energy in zip(
-            answer.candidates, (0.5, 0.3, 0.31), (10.0, 90.0, 80.0), strict=False
-        )
-    )
+
+    def change(one, risk, energy):
+        prediction = one.prediction.change(energy=np.full(len(one.poses), energy))
+        return replace(one, prediction=prediction, verdict=replace(one.verdict, risk=risk))
+
+    values = zip(answer.candidates, (0.5, 0.3, 0.31), (10.0, 90.0, 80.0), strict=False)
+    risky, safe, thrifty = (change(*one) for one in values)
     assert choose((risky, safe, thrifty)).choice == 2
     refused = replace(thrifty, verdict=replace(thrifty.verdict, traversable=False))
     assert choose((risky, safe, refused)).choice == 1

@@ -19,6 +19,7 @@ from rover_planner.survey.layers import (
 )
 from rover_planner.survey.layout import choose_chunk, find_halo
 from rover_planner.survey.tile_survey import outline_of, survey_tile
+from support.grounds import raised
 from support.rovers import LSR1
 from support.survey_maps import (
     assert_same_bits,
@@ -110,15 +111,11 @@ def test_the_layers_sum_up_the_headings_of_each_cell_and_turns_to_both_sides(gro
     assert not (bits & ~passes).any()
     np.testing.assert_array_equal(layers["best_class"] == 0, bits.any(axis=1))
     np.testing.assert_array_equal(layers["first_limit"] == NO_LIMIT, bits.all(axis=1))
-    tilt = np.arccos(np.cos(prediction.roll) * np.cos(prediction.pitch)).reshape(-1, 4)
-    some = ~np.isnan(tilt).all(axis=1)
-    np.testing.assert_allclose(
-        layers["worst_tilt"][some], np.nanmax(tilt[some], axis=1), rtol=1e-6, atol=1e-7
-    )
-    clearance = prediction.belly_clearance.reshape(-1, 4)[some]
-    np.testing.assert_allclose(
-        layers["worst_belly_clearance"][some], np.nanmin(clearance, axis=1), rtol=1e-6
-    )
+    told = layers["worst_tilt"], -layers["worst_belly_clearance"]
+    values = [one.reshape(-1, 4) for one in (prediction.tilt, -prediction.belly_clearance)]
+    some = ~np.isnan(values[0]).all(axis=1)
+    for worst, each in zip(told, values, strict=True):
+        np.testing.assert_allclose(worst[some], np.nanmax(each[some], axis=1), rtol=1e-6)
     assert np.isnan(layers["worst_tilt"][~some]).all() and (~some).any()
     worst, best = (layers[f"{one}_friction_utilisation"][some] for one in ("worst", "best"))
     assert (worst >= best).all()
@@ -147,9 +144,7 @@ def test_the_chance_of_a_cell_is_that_of_its_headings_and_1_where_one_fails_as_t
 
 def test_no_cell_passes_whose_outline_touches_unknown_ground():
     request = make_request(headings=16)
-    heights = np.zeros((60, 60))
-    heights[30, 30] = np.nan
-    ground = Terrain(heights, 0.05)
+    ground = raised(Terrain(np.zeros((60, 60)), 0.05), (30, 30), np.nan)
     places = places_on(ground, 1)
     passes = unpack_bits(survey_tile(request, ground, places)["passable_headings"], 16)
     rear, front, right, left = outline_of(request.rover)

@@ -53,13 +53,9 @@ def arc_across(seed: int, size: float, count: int = 24) -> np.ndarray:
 
 
 def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterator[Terrain]:
-    """Yield maps with random height errors of the given standard deviations.
+    """Yield maps with random height errors by the layer `elevation_std` of a map.
 
-    Args:
-        terrain: The map, with a layer `elevation_std`.
-        length: Correlation length [m], at which the correlation is 1/e; 0: independent errors.
-        count: Number of maps.
-        seed: Seed of the random numbers.
+    Their correlation is 1/e at a length [m]; with 0 the error of each cell is its own.
     """
     rng = np.random.default_rng(seed)
     shape, width = terrain.elevation.shape, length / terrain.resolution / 2.0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from support.grounds import bouldered, fractal, make_terrain, plane, random_poses, rocky, smooth
+from support.grounds import bouldered, fractal, plane, raised, random_poses, rocky, smooth
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import STEERED, STRAIGHT, reference_predictions
@@ -55,9 +55,8 @@ def test_turned_wheels_touch_by_an_independent_dense_look_over_their_whole_width
 
 def test_a_peak_below_a_wheel_is_found_wherever_it_is():
     """Also between the circles of the wheel that are looked at first."""
-    heights = np.zeros((241, 241))
-    heights[120 - 31, 120] = 0.03  # below the middle right wheel
-    ground = Terrain(heights, 0.01, (-1.2, -1.2))
+    level = Terrain(np.zeros((241, 241)), 0.01, (-1.2, -1.2))
+    ground = raised(level, (120 - 31, 120), 0.03)  # below the middle right wheel
     x = LSR1.suspension.wheels["middle"][0]
     aside = 0.45 * LSR1.wheel.width * np.linspace(-1.0, 1.0, 19)
     prediction = judge_poses(LSR1, ground, poses_at(-x, aside), np.zeros(19))[0]
@@ -161,11 +160,9 @@ def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw)
     assert foot[2] == pytest.approx(slope_x * foot[0] + slope_y * foot[1] + height, abs=2.0 * GAP)
 
 
-def known_to_the_left_of(edge: float) -> Terrain:
-    return make_terrain(lambda x, y: np.where(x > edge, np.nan, 0.0), 0.04, 1.2)
-
-
 LEVEL = plane(0.0, 0.0)
+LEFT = raised(LEVEL, np.s_[:, 46:], np.nan)
+"""Ground that is known up to x = 0.6."""
 REACH = LEVEL.bounds[1] - 0.5
 """Where the front wheels touch the last cell of the map."""
 
@@ -173,9 +170,10 @@ REACH = LEVEL.bounds[1] - 0.5
 @pytest.mark.parametrize(
     ("ground", "x", "status"),
     [
-        (known_to_the_left_of(0.6), 0.0, PoseStatus.SETTLED),
-        (known_to_the_left_of(0.6), 0.3, PoseStatus.UNKNOWN_GROUND),
-        (known_to_the_left_of(1.0), 0.95, PoseStatus.OFF_MAP),  # comes before unknown ground
+        (LEFT, 0.0, PoseStatus.SETTLED),
+        (LEFT, 0.3, PoseStatus.UNKNOWN_GROUND),
+        # Off the map comes before unknown ground.
+        (raised(LEVEL, np.s_[:, 56:], np.nan), 0.95, PoseStatus.OFF_MAP),
         (LEVEL, REACH - 0.001, PoseStatus.SETTLED),
         (LEVEL, REACH + 0.001, PoseStatus.OFF_MAP),
         (LEVEL, 40.0, PoseStatus.OFF_MAP),
@@ -200,23 +198,15 @@ def test_poses_that_do_not_settle_have_nan_for_every_number():
             assert np.isfinite(values[0]).all() and np.isnan(values[1]).all(), one.name
 
 
-HALF, RESOLUTION = 60, 0.02
 COARSE = 0.05 * (-3.5 + np.arange(9.0))
 """Heights of a slope on cells larger than the belly [m]."""
-
-
-def unknown_around(rows: int, columns: int) -> Terrain:
-    """Return level ground with so many unknown cells to each side of the middle of the rover."""
-    z = np.zeros((2 * HALF + 1, 2 * HALF + 1))
-    z[HALF - rows : HALF + rows + 1, HALF - columns : HALF + columns + 1] = np.nan
-    return Terrain(z, RESOLUTION, (-HALF * RESOLUTION, -HALF * RESOLUTION))
 
 
 @pytest.mark.parametrize(
     ("ground", "clearance"),
     [
-        (unknown_around(0, 0), 0.24),  # unknown cells are passed over
-        (unknown_around(11, 16), np.nan),
+        (raised(LEVEL, (30, 30), np.nan), 0.24),  # unknown cells are passed over
+        (raised(LEVEL, np.s_[25:36, 22:39], np.nan), np.nan),  # all cells below the belly
         (Terrain(np.zeros((9, 9)), 1.0, (-3.5, -3.5)), 0.24),
         (Terrain(np.tile(COARSE, (9, 1)), 1.0, (-3.5, -3.5)), 0.24 / np.cos(np.arctan(0.05))),
     ],

@@ -53,9 +53,8 @@ def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
     x = rows.force_unit * rows.complete(np.linspace(-0.1, 0.1, 6))
     lateral = rows.lateral_forces(x)
     forces = np.column_stack([x[TRACTIONS], lateral, x[LOADS]])
-    placed = place_rover(
-        rover, judge_path(rover, plane(0.0, 0.0, half=4.0), [[0.0, 0.0, 0.0]])[0], 0
-    )
+    standing = judge_path(rover, plane(0.0, 0.0, half=4.0), [[0.0, 0.0, 0.0]])[0]
+    placed = place_rover(rover, standing, 0)
     masses, centres, *_ = zip(*placed.masses, strict=True)
     com = np.average(centres, axis=0, weights=masses)
     places = placed.wheels - [0.0, 0.0, rover.wheel.radius]

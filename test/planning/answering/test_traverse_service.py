@@ -163,16 +163,15 @@ def test_the_measured_suspension_is_compared_with_the_predicted_one_where_the_ro
 def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     service = make_service(make_terrain(waves))
     service.given_path = GivenPath(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")
-    stowed = service.snapshot().check_path().candidate.prediction.wheel_loads
-    manipulator = service.settings.rover.manipulator
-    stretched = dict(zip(manipulator.joints, (0.0, 0.0, 0.0), strict=True))
-    first = manipulator.joints[0]
-    service.take_joints({first: stretched[first]})
-    np.testing.assert_array_equal(
-        service.snapshot().check_path().candidate.prediction.wheel_loads, stowed
-    )
-    service.take_joints(stretched)
-    moved = service.snapshot().check_path().candidate.prediction.wheel_loads
+
+    def find_loads():
+        return service.snapshot().check_path().candidate.prediction.wheel_loads
+
+    stowed, joints = find_loads(), service.settings.rover.manipulator.joints
+    service.take_joints({joints[0]: 0.0})
+    np.testing.assert_array_equal(find_loads(), stowed)
+    service.take_joints(dict.fromkeys(joints, 0.0))
+    moved = find_loads()
     assert np.abs(moved - stowed).max() > 0.05
     assert moved[:, [2, 5]].sum() > stowed[:, [2, 5]].sum()
 
