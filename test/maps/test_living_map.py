@@ -73,31 +73,28 @@ def test_a_loaded_map_survives_100_local_updates_to_the_bit():
     assert merged.elevation_std is None
 
 
-def test_the_newer_height_wins_whichever_arrives_last():
+@pytest.mark.parametrize(
+    ("source", "maps"),
+    [
+        # height and time of each map, and which of the two heights wins
+        ("rear", [(0.1, 10.0, 0.1), (0.2, 9.0, 0.1), (0.3, 11.0, 0.3)]),
+        (TOPIC, [(0.1, 1e9, 0.1), (0.2, 3.0, 0.2)]),  # its clock went back
+    ],
+)
+def test_the_newer_height_wins_whichever_arrives_last(source, maps):
     living = LivingMap()
-    living.merge(local_map((0.0, 0.0), 0.1), "front", 10.0)
-    living.merge(local_map((0.0, 0.0), 0.2), "rear", 9.0)
-    assert cell(living, 0.5, 0.5) == (0.1, "front", 10.0)
-    living.merge(local_map((0.0, 0.0), 0.3), "rear", 11.0)
-    assert cell(living, 0.5, 0.5) == (0.3, "rear", 11.0)
-
-
-def test_a_source_whose_clock_goes_back_is_still_heard():
-    living = LivingMap()
-    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1e9)
-    living.merge(local_map((0.0, 0.0), 0.2), TOPIC, 3.0)
-    assert cell(living, 0.5, 0.5) == (0.2, TOPIC, 3.0)
+    for k, (height, time, winner) in enumerate(maps):
+        living.merge(local_map((0.0, 0.0), height), source if k else TOPIC, time)
+        assert cell(living, 0.5, 0.5)[0] == winner
+    assert cell(living, 0.5, 0.5)[1:] == (source, maps[-1][1])
 
 
 def test_the_surer_height_wins_until_it_has_aged():
     living = LivingMap(TraverseServerParameters(map_merge=SUREST, map_ageing=0.001))
-    living.merge(local_map((0.0, 0.0), 0.1, std=0.01), TOPIC, 0.0)
-    living.merge(local_map((0.0, 0.0), 0.2, std=0.03), TOPIC, 10.0)
-    assert cell(living, 0.5, 0.5)[0] == 0.1
-    living.merge(local_map((0.0, 0.0), 0.3, std=0.03), TOPIC, 40.0)
-    assert cell(living, 0.5, 0.5)[0] == 0.3
-    living.merge(local_map((0.0, 0.0), 0.4, std=0.002), TOPIC, 41.0)
-    assert cell(living, 0.5, 0.5)[0] == 0.4
+    maps = [(0.1, 0.01, 0.0, 0.1), (0.2, 0.03, 10.0, 0.1), (0.3, 0.03, 40.0, 0.3)]
+    for height, std, time, winner in [*maps, (0.4, 0.002, 41.0, 0.4)]:
+        living.merge(local_map((0.0, 0.0), height, std=std), TOPIC, time)
+        assert cell(living, 0.5, 0.5)[0] == winner
     np.testing.assert_array_equal(living.snapshot().terrain.elevation_std, 0.002)
 
 

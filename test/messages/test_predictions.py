@@ -43,10 +43,8 @@ def prediction():
 def test_an_array_has_labelled_dimensions_and_values_of_their_number():
     values = np.arange(12.0).reshape(2, 6)
     message = waypoint_array(values)
-    assert [(dim.label, dim.size, dim.stride) for dim in message.layout.dim] == [
-        ("waypoint", 2, 12),
-        ("wheel", 6, 6),
-    ]
+    dimensions = [(one.label, one.size, one.stride) for one in message.layout.dim]
+    assert dimensions == [("waypoint", 2, 12), ("wheel", 6, 6)]
     assert isinstance(message.data, array.array) and message.data.typecode == "d"
     np.testing.assert_array_equal(array_values(message), values)
     message.data = message.data[:-1]
@@ -91,10 +89,8 @@ def test_a_settled_path_has_height_and_full_orientation(prediction):
         place = pose.pose.position
         np.testing.assert_array_equal((place.x, place.y, place.z), prediction.position[i])
         turn = pose.pose.orientation
-        np.testing.assert_array_equal(
-            (turn.x, turn.y, turn.z, turn.w),
-            xyzw_from_rpy(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]),
-        )
+        right = xyzw_from_rpy(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2])
+        np.testing.assert_array_equal((turn.x, turn.y, turn.z, turn.w), right)
         assert abs(turn.x) > 1e-3 and abs(turn.y) > 1e-3
         assert pose.header == path.header and path.header.stamp == STAMP
 

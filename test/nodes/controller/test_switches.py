@@ -9,12 +9,12 @@ from functools import partial
 
 import numpy as np
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from rover_planner.nodes.traction_controller import TractionController
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import sensor_qos, topic_qos
 from support.ros_fixtures import PATIENT, call, run_in_executor
 from support.waiting import repeat_until, wait_until
 
@@ -67,19 +67,9 @@ def test_at_rest_inputs_are_read_with_each_third_update_or_before_they_are_old(r
     node.destroy_node()
 
 
-@pytest.mark.parametrize(
-    ("reliability", "durability"), [("RELIABLE", "VOLATILE"), ("BEST_EFFORT", "TRANSIENT_LOCAL")]
-)
-def test_every_emergency_stop_is_heard_and_acts_within_one_cycle(
-    rover, controller, enable, reliability, durability
-):
-    qos = QoSProfile(
-        depth=1,
-        reliability=ReliabilityPolicy[reliability],
-        durability=DurabilityPolicy[durability],
-    )
+@pytest.mark.parametrize("qos", [topic_qos(), sensor_qos()], ids=["reliable", "best_effort"])
+def test_every_emergency_stop_is_heard_and_acts_within_one_cycle(rover, controller, enable, qos):
     button = rover.create_publisher(Bool, "traction_controller/emergency_stop", qos)
-
     wait_until(button.get_subscription_count, "who hears the button")
     button.publish(Bool(data=True))
     pressed = time.time_ns()
