@@ -100,12 +100,8 @@ def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
 
     Three forces and three moments about the body origin of the whole rover, the moment about each
     bogie pivot (eq 15), and the difference of the moments about the rocker pivots (eq 14 for both
-    sides). Moments are divided by weight and wheelbase.
-
-    Args:
-        rover: The rover.
-        placed: Positions of its parts.
-        acting: All forces: (force [N], position [m], side, whether on the bogie).
+    sides). Moments are divided by weight and wheelbase. Each force that is `acting` is told with
+    its position: (force [N], position [m], side, whether on the bogie).
     """
     axis = placed.attitude[:, 1]
 

@@ -154,8 +154,8 @@ def _tip_move(refusal: JudgedCase, k: int, angle: float) -> str:
 
 
 def _payload(refusal: JudgedCase) -> Span | None:
-    arm, told = refusal.case.rover.manipulator, refusal.case.options.payload
-    now = told if told is not None else arm.payload if arm is not None else 0.0
+    arm = refusal.case.site.assumed_rover.manipulator
+    now = 0.0 if arm is None else arm.payload
     return Span(now, (0.0,)) if now > 0.0 else None
 
 
@@ -242,14 +242,12 @@ def _friction(refusal: JudgedCase) -> Span | None:
     case = refusal.case
     if case.terrain.friction is not None or case.terrain.soil is not None or case.options.soil:
         return None  # the ground has its own
-    told = case.options.friction
-    now = case.rover.friction if told is None else told
+    now = case.site.assumed_rover.friction
     return Span(now, (MOST_FRICTION,)) if now < MOST_FRICTION else None
 
 
 def _torque(refusal: JudgedCase) -> Span:
-    told = refusal.case.options.max_torque
-    now = refusal.case.rover.wheel.max_torque if told is None else told
+    now = refusal.case.site.assumed_rover.wheel.max_torque
     return Span(now, (MOST_TORQUE * now,))
 
 

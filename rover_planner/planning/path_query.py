@@ -193,10 +193,11 @@ def generate_paths(
 ) -> list[NDArray[np.float64]]:
     """Return the poses (n, 3) of the candidate paths, the direct one first.
 
+    The options must have their lengths, see `PathQueryOptions.fit`.
+
     Raises:
         PlanningError: Start, goal or options are invalid.
     """
-    options = options.fit(rover)
     return generate_candidates(
         start,
         goal,

@@ -22,13 +22,9 @@ def standing_at(rover, terrain, pose):
     there = judge_path(rover, terrain, np.array([pose]))[0]
     assert there.settled[0]
     angles = (*there.rocker_angle[0], *there.bogie_angle[0])
-    return Standing(
-        *there.position[0].tolist(),
-        float(there.roll[0]),
-        float(there.pitch[0]),
-        pose[2],
-        dict(zip(SUSPENSION_JOINTS, map(float, angles), strict=True)),
-    ), there
+    attitude = float(there.roll[0]), float(there.pitch[0]), pose[2]
+    suspension = dict(zip(SUSPENSION_JOINTS, map(float, angles), strict=True))
+    return Standing(*there.position[0].tolist(), *attitude, suspension), there
 
 
 @pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)

@@ -102,7 +102,7 @@ def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_
     service.take_terrain(large)
     found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
     assert found.state == STOPPED
-    assert found.judgement.judge.site.terrain.elevation.size < 0.2 * large.elevation.size
+    assert found.judgement.site.terrain.elevation.size < 0.2 * large.elevation.size
 
 
 @pytest.mark.parametrize(

@@ -139,13 +139,8 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
 
 
 def test_steering_and_imu_are_read_as_the_parameters_say(ros):
-    upside_down = (np.pi, 0.0, 0.0)
-    ros.start(
-        ground_learner.GroundLearnerNode,
-        steering_sign="right",
-        imu_frame="imu_link",
-        imu_mounting=list(upside_down),
-    )
+    values = {"steering_sign": "right", "imu_frame": "imu_link", "imu_mounting": [np.pi, 0.0, 0.0]}
+    ros.start(ground_learner.GroundLearnerNode, **values)
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     speed, yaw_rate = 0.05, 0.06
@@ -157,7 +152,7 @@ def test_steering_and_imu_are_read_as_the_parameters_say(ros):
         rover.senders["joint_states"].publish(joints)
         stamp = ns_to_stamp(round(time_now * 1e9))
         rates = np.array([0.0, 0.0, -yaw_rate])
-        rover.send_imu(xyzw_from_rpy(*upside_down), rates, stamp, "imu_link")
+        rover.send_imu(xyzw_from_rpy(*values["imu_mounting"]), rates, stamp, "imu_link")
         rover.send_imu(xyzw_from_rpy(0.0, 0.0, 0.0), rates, stamp, "camera")
     wait_until(lambda: rover.wheels, "the odometry of the wheels")
     twist = rover.wheels[-1].twist.twist

@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rover_physics.bounds.path import is_uncertain
 from rover_physics.limits.table import CHANCE
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import pack_model
@@ -232,8 +233,8 @@ class PathJudge:
         With the friction and the torque limit below which they are with the accepted chance,
         pieces need no samples; the whole path gets them.
         """
-        terrain, options, rover = self.site.terrain, self.site.options, self.site.rover
-        accepted, model = options.asked_chance, options.model
+        terrain, rover = self.site.terrain, self.site.assumed_rover
+        accepted, model = self.site.options.asked_chance, self.site.options.model
         if accepted is None:
             return terrain, model
         low = min(NormalDist().inv_cdf(max(accepted, LEAST_CHANCE)), 0.0)
@@ -246,9 +247,8 @@ class PathJudge:
         ground = terrain if layer is None else replace(terrain, friction=friction * layer)
         return ground, replace(
             model,
-            friction=friction * (rover.friction if model.friction is None else model.friction),
-            max_torque=torque
-            * (rover.wheel.max_torque if model.max_torque is None else model.max_torque),
+            friction=friction * rover.friction,
+            max_torque=torque * rover.wheel.max_torque,
         )
 
     def judge_pieces(self, pieces: Sequence[Piece]) -> list[JudgedPiece]:
@@ -276,7 +276,7 @@ class PathJudge:
         A rover that slips ahead up a slope of sand stands there if it can back out.
         """
         site = self.site
-        if site.terrain.elevation_std is None or not site.options.map_sigmas:
+        if not is_uncertain(site.terrain, site.options.map_sigmas):
             self.asked_poses += len(poses)
             model = pack_model(site.rover, site.terrain, site.options.model)
             codes = find_codes(model.limits, model.evaluate(poses))

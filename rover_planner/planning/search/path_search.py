@@ -354,7 +354,7 @@ class _PathFinder:
         site, nodes = self._site, self._nodes
         rover, spacing = site.rover, site.options.waypoint_spacing
         edges = self._memory.recall_edges(site, nodes)
-        climb = steepest_climb(rover, site.options.model.friction or rover.friction)
+        climb = steepest_climb(rover, site.assumed_rover.friction)
         terrain = cut_out(site, nodes) if self._is_limited else site.terrain
         ground = estimate_ground(rover, terrain, nodes)
         edges.standing[ground.groundless] = edges.state_of("unknown_ground")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
+from rover_planner.planning.assumptions import assume
 from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.unobserved_check import NONE_REFUSED, UnobservedCheck
@@ -28,6 +29,11 @@ class Site:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", self.options.fit(self.rover))
+
+    @property
+    def assumed_rover(self) -> Rover:
+        """The rover with friction, torque and payload of the options in place of its own."""
+        return assume(self.rover, self.options.model).change(self.rover)
 
     def refuse_ground(self, path: Candidate) -> Candidate:
         """Return a path as the model judged it, refused where its ground is unseen or marked."""

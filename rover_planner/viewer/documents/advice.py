@@ -8,7 +8,6 @@ from typing import Any
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
-from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.state.scenario import JudgedPath, Scenario
 
 PROMISED = 20.0
@@ -53,7 +52,7 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
     has_path, model = case.poses is not remedy.refusal.case.poses, case.options
     return replace(
         scenario,
-        rover=assume(case.rover, case.options).change(case.rover),
+        rover=case.site.assumed_rover,
         options=scenario.options.change(
             policy=model.policy, backward=model.backward, joint_angles=model.joint_angles
         ),
