@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The hazard map over real DDS: latched, followed by changes, and the same as the service's."""
 
-import threading
-
 import numpy as np
 import pytest
 from nav_msgs.msg import OccupancyGrid
@@ -81,19 +79,11 @@ def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client):
 
 
 def test_switched_off_no_cell_is_free_and_switched_on_none_of_what_was_judged_before(
-    mapping, client, monkeypatch
+    mapping, client, hold
 ):
     worst, first = hear_grids(client, "worst", "heading_1")
-    judged, go_on = threading.Event(), threading.Event()
     wait_until(lambda: is_free(worst) and is_free(first), "the map", 60.0)
-    show = HazardTopics._show
-
-    def show_late(*given):
-        judged.set()
-        assert go_on.wait(60.0)
-        show(*given)
-
-    monkeypatch.setattr(HazardTopics, "_show", show_late)
+    judged, go_on = hold(HazardTopics, "_show")
     client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.001, half=3.0, resolution=0.1))
     assert judged.wait(60.0), "the classes on the second map"
     assert client.set_parameter("hazard_map", False)[0]
