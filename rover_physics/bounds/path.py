@@ -36,6 +36,7 @@ from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
 from rover_physics.prediction.packed_model import PackedModel, forget_models
 from rover_physics.prediction.sweep import check_poses
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import (
     BOUNDED_VALUES,
     WAYPOINT_BOUNDS,
@@ -84,6 +85,29 @@ def check_sigmas(sigmas: float | None) -> float:
     return value
 
 
+def check_bounds(terrain: Terrain, options: SweepOptions, sigmas: float | None) -> float:
+    """Return the standard deviations to allow for on a terrain, 0 if its heights are exact.
+
+    Raises:
+        ModelError: `sigmas` is negative or not a number, a terrain with too many soils, or policy
+            "servo".
+    """
+    allowed = check_sigmas(sigmas)
+    if terrain.elevation_std is None or allowed == 0.0:
+        return 0.0
+    if options.policy == SERVO:
+        raise ModelError(
+            f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
+            f"sigmas, or use {EQUAL!r} or {OPTIMAL!r}"
+        )
+    if len(terrain.soil_names) >= MAX_SOILS:
+        raise ModelError(
+            f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
+            f"most {MAX_SOILS - 1}"
+        )
+    return allowed
+
+
 def bound_path(
     model: PackedModel, prediction: PathPrediction, sigmas: float | None
 ) -> PathBounds | None:
@@ -100,23 +124,12 @@ def bound_path(
         layer or there are no standard deviations.
 
     Raises:
-        ModelError: `sigmas` is negative or not a number, a terrain with too many soils, or policy
-            "servo".
+        ModelError: As `check_bounds`.
     """
-    allowed, terrain = check_sigmas(sigmas), model.terrain
-    if terrain.elevation_std is None or allowed == 0.0:
+    allowed = check_bounds(model.terrain, model.options, sigmas)
+    if allowed == 0.0:
         return None
-    if model.options.policy == SERVO:
-        raise ModelError(
-            f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
-            f"sigmas, or use {EQUAL!r} or {OPTIMAL!r}"
-        )
-    if len(terrain.soil_names) >= MAX_SOILS:
-        raise ModelError(
-            f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
-            f"most {MAX_SOILS - 1}"
-        )
-    grounds = _pack_grounds(terrain, allowed)
+    grounds = _pack_grounds(model.terrain, allowed)
     found = find_bounds(model, grounds, prediction.poses, prediction.results)
     for name in BOUNDED_VALUES:
         value, (low, high) = getattr(prediction, name), np.moveaxis(found[name], -1, 0)
