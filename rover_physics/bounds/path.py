@@ -85,16 +85,17 @@ def check_sigmas(sigmas: float | None) -> float:
     return value
 
 
-def check_bounds(terrain: Terrain, options: SweepOptions, sigmas: float | None) -> float:
-    """Return the standard deviations to allow for on a terrain, 0 if its heights are exact.
+def is_uncertain(terrain: Terrain, sigmas: float | None) -> bool:
+    """Return whether heights of a terrain may be wrong by a number of standard deviations."""
+    return bool(sigmas) and terrain.elevation_std is not None
+
+
+def check_bounds(terrain: Terrain, options: SweepOptions) -> None:
+    """Check that there are bounds on a terrain with uncertain heights.
 
     Raises:
-        ModelError: `sigmas` is negative or not a number, a terrain with too many soils, or policy
-            "servo".
+        ModelError: A terrain with too many soils, or policy "servo".
     """
-    allowed = check_sigmas(sigmas)
-    if terrain.elevation_std is None or allowed == 0.0:
-        return 0.0
     if options.policy == SERVO:
         raise ModelError(
             f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
@@ -105,19 +106,15 @@ def check_bounds(terrain: Terrain, options: SweepOptions, sigmas: float | None) 
             f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
             f"most {MAX_SOILS - 1}"
         )
-    return allowed
 
 
-def bound_path(
-    model: PackedModel, prediction: PathPrediction, sigmas: float | None
-) -> PathBounds | None:
+def bound_path(model: PackedModel, prediction: PathPrediction, sigmas: float) -> PathBounds | None:
     """Bound a prediction along a path over a map with uncertain heights.
 
     Args:
         model: The model on its terrain, with a layer `elevation_std`.
         prediction: What the model predicts.
-        sigmas: Number of standard deviations by which each height may be wrong; 0 or None for no
-            bounds.
+        sigmas: Number of standard deviations by which each height may be wrong; 0 for no bounds.
 
     Returns:
         Bounds on each waypoint, which contain the prediction; None if the terrain has no such
@@ -126,15 +123,16 @@ def bound_path(
     Raises:
         ModelError: As `check_bounds`.
     """
-    allowed = check_bounds(model.terrain, model.options, sigmas)
-    if allowed == 0.0:
+    terrain = model.terrain
+    if not is_uncertain(terrain, sigmas):
         return None
-    grounds = _pack_grounds(model.terrain, allowed)
+    check_bounds(terrain, model.options)
+    grounds = _pack_grounds(terrain, sigmas)
     found = find_bounds(model, grounds, prediction.poses, prediction.results)
     for name in BOUNDED_VALUES:
         value, (low, high) = getattr(prediction, name), np.moveaxis(found[name], -1, 0)
         low[:], high[:] = np.minimum(low, value), np.maximum(high, value)
-    return PathBounds(allowed, found)
+    return PathBounds(sigmas, found)
 
 
 @lru_cache(maxsize=2)
@@ -150,7 +148,7 @@ def _pack_grounds(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Grou
 
 def prepare_bounds(terrain: Terrain, sigmas: float) -> None:
     """Pack an uncertain terrain for `bound_path`, so that the first bounds on it are fast."""
-    if terrain.elevation_std is not None and sigmas > 0.0:
+    if is_uncertain(terrain, sigmas):
         _pack_grounds(terrain, sigmas)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.bounds.path import check_bounds
+from rover_physics.bounds.path import check_bounds, is_uncertain
 from rover_physics.terrain.grid import Terrain, fingerprint, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
@@ -15,7 +15,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob
 from rover_planner.survey.dask_cluster import ClusterSettings, check_machine
 from rover_planner.survey.geotiff import BAND, GeoTiffMap, is_geotiff
-from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED
+from rover_planner.survey.layers import NOT_SURVEYED
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
 from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.request import SurveyRequest
@@ -76,7 +76,8 @@ def prepare_survey(
         frame, map_file, content = source.frame, str(source.path), source.hash_content()
     else:
         terrain = load_terrain(map_name, max_cells).fill_gaps(max_gap)
-        check_bounds(terrain, request.options, request.sigmas)
+        if is_uncertain(terrain, request.sigmas):
+            check_bounds(terrain, request.options)
         frame = MapFrame(terrain.elevation.shape, terrain.resolution, terrain.origin, "")
         map_file, content = "", fingerprint(terrain)
     notes = _make_notes(request, frame, map_file, content, chunk)
@@ -104,8 +105,8 @@ def summarise(store: SurveyStore) -> dict[str, Any]:
     surveyed = cells - int(counts["best_class"][NOT_SURVEYED])
     shares = {
         name: {
-            which: round(int(count[CLASS_NUMBERS[which]]) / max(surveyed, 1), 6)
-            for which in TRAVERSABILITY_CLASSES
+            which: round(int(count[number]) / max(surveyed, 1), 6)
+            for number, which in enumerate(TRAVERSABILITY_CLASSES)
         }
         for name, count in counts.items()
     }

@@ -22,7 +22,6 @@ from support.rovers import LSR1, M2020
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
-    count_chunks,
     layers_of,
     make_request,
     make_rough_map,
@@ -172,7 +171,9 @@ def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypa
     forced, fsync = [], os.fsync
 
     def force(number):
-        forced.append((Path(f"/proc/self/fd/{number}").readlink(), count_chunks(path)))
+        forced.append(
+            (Path(f"/proc/self/fd/{number}").readlink(), len(prepared.store.find_finished()))
+        )
         fsync(number)
 
     monkeypatch.setattr(os, "fsync", force)

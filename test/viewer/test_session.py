@@ -19,7 +19,7 @@ from rover_planner.viewer.documents.paths import describe_changes, describe_path
 from rover_planner.viewer.state.scenario import CANDIDATES
 from support.grounds import make_terrain, wall_at, waves
 from support.rovers import M2020
-from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
+from support.viewer.sessions import LSR1, STRAIGHT, Judge, blocked_session, ramp, session_on
 
 # What a person looks at, and what it is compared with.
 
@@ -165,7 +165,7 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
 
 def test_a_recorded_prediction_is_shown_as_it_was_recorded_until_the_rover_is_changed(tmp_path):
     terrain, file = make_terrain(wall_at(0.5)), tmp_path / "out.npz"
-    prediction, verdict = judge_path(LSR1, terrain, straight())
+    prediction, verdict = judge_path(LSR1, terrain, STRAIGHT)
     write_prediction(file, prediction, verdict)
     again, reasons, assumptions = read_prediction(file)
     assert assumptions is None
@@ -193,7 +193,7 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     options = SweepOptions(
         policy="optimal", soil="dry_sand", friction=0.7, payload=0.5, joint_angles=angles
     )
-    prediction, verdict = judge_path(LSR1, ground, straight(), options)
+    prediction, verdict = judge_path(LSR1, ground, STRAIGHT, options)
     assert verdict.max_sinkage > 0.0
     file = tmp_path / "out.npz"
     assumed = assume(LSR1, options, 2.0)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import rclpy
 from nav_msgs.msg import Odometry, Path
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from msg_adapters.paths import poses_path
@@ -28,12 +27,6 @@ from support.waiting import wait_until
 
 START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
 """Words for a start, a goal before the wall at x = 0.5 m, and one behind it."""
-
-
-def test_ros_that_is_shut_down_while_the_node_waits_is_the_end_of_waiting(planner):
-    rclpy.shutdown(context=planner.context)  # as where a signal comes between two looks
-    with pytest.raises(ExternalShutdownException):
-        planner.wait_for_server()
 
 
 def test_negative_numbers_need_no_equals_sign_and_words_of_ros_are_put_aside():

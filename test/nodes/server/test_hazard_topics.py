@@ -73,10 +73,7 @@ def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client):
     assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.05)
     assert (grid.info.height, grid.info.width) == terrain.elevation.shape
     assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
-    wait_until(
-        lambda: ask_for_grid(client).data == worst[-1].data,
-        "the same map from the service",
-    )
+    wait_until(lambda: ask_for_grid(client).data == worst[-1].data, "it from the service")
     client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
     for grids in (worst, best):
         wait_until(lambda grids=grids: has_rock(grids), "the rock", 60.0)

@@ -16,7 +16,7 @@ from rover_planner.ros.qos import map_qos
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import SERVER, ask
 from support.ros_fixtures import hear
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 PRIOR = make_terrain(waves)
 
@@ -70,15 +70,13 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
     server = start_server(planner="fan", footprint_margin=0.1)
     client.send_terrain(make_terrain(lambda x, y: np.where(x < 0.0, np.nan, 0.0 * x)))
     start, goal = (-0.45, 0.0, 0.0), (2.0, 0.0, 0.0)
-
-    def is_filled():
-        client.send_joints(SUSPENSION_JOINTS, 4 * [0.0])
-        client.send_odometry(start, height=0.3)  # of the body's origin of lsr1
-        time.sleep(0.1)
-        return any("ground under the rover filled" in line for line in client.logs)
-
     before = server.service.known_map
-    wait_until(is_filled, "the filled ground")
+    client.stand(start, height=0.3)  # of the body's origin of lsr1
+    repeat_until(
+        lambda: client.send_joints(SUSPENSION_JOINTS, 4 * [0.0]),
+        lambda: any("ground under the rover filled" in line for line in client.logs),
+        "the filled ground",
+    )
     after = server.service.known_map
     assert (after.arrival, after.stamp) == (before.arrival, before.stamp)
     assert ask(client, start, goal)[1]["traversable"] == "true"

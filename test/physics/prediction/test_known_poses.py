@@ -11,9 +11,9 @@ from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import FIRST_BLOCK
 from rover_physics.results.record import numbers_of
+from support.grounds import rocky
 from support.paths import poses_at
 from support.predictions import assert_same
-from support.rough_grounds import rocky
 from support.rovers import LSR1
 
 GROUND = rocky(5)

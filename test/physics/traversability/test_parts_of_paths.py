@@ -16,11 +16,10 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure
 from rover_physics.traversability.verdict import hold_against_limits
-from support.grounds import make_terrain
+from support.grounds import bouldered, bowl, fractal, make_terrain, rocky, scaled_for, with_std
 from support.paths import arc_of, poses_at
 from support.predictions import assert_same
 from support.reference_drives import drive_ground, drive_path
-from support.rough_grounds import bouldered, bowl, fractal, rocky, scaled_for, with_std
 from support.rovers import LSR1 as ROVER
 
 GROUND = bouldered(3, half=6.0, count=600)
@@ -74,16 +73,6 @@ def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(cours
     assert_same(swept.prediction, whole.cut(count))
     assert_same(swept.prediction.between, whole.cut(count).between)
     assert stopped.codes == verdict.codes[:count]
-
-
-def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monkeypatch):
-    """A sweep that took the end of a block for that of the path would refuse the fall."""
-    poses = straight(-3.0)
-    _, whole = judge_path(ROVER, GROUND, poses)
-    assert whole.traversable and whole.max_wheel_drop > 0.0
-    for block in (1, 2, 3, 5, 7, 11):
-        monkeypatch.setattr(sweep, "FIRST_BLOCK", block)
-        assert judge_path(ROVER, GROUND, poses, stop_at_failure=True)[1].traversable
 
 
 def steps_down(step: float) -> Terrain:
