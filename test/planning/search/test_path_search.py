@@ -250,18 +250,22 @@ def test_only_the_heights_around_the_window_are_looked_at(monkeypatch):
     assert "m around start and goal" in refused.reason
 
 
-def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
+def test_a_way_to_unknown_ground_ends_at_the_frontier_if_wanted_and_at_the_goal_once_it_is_known():
     question = ask(make_terrain(lambda x, y: np.where(x > 1.475, np.nan, waves(x, y))))
     refused = find_path(question, LONG)
     assert refused.outcome == GOAL_REFUSED
     assert refused.reason == "the rover cannot stand at the goal: unknown ground under a wheel"
-    answer = find_path(question, replace(LONG, frontier=True))
+    memory, to_frontier = EdgeMemory(), replace(LONG, frontier=True)
+    answer = find_path(question, to_frontier, memory)
     assert answer.outcome == FOUND and answer.path.verdict.traversable
     end = answer.path.poses[-1]
     left = np.hypot(*(end[:2] - GOAL[:2]))
     assert f"{left:.1f} m before it" in answer.reason
     # On level ground, a wheel of the rover that stands across the edge is 0.4 m from its middle.
     assert 1.0 < left < 1.7
+    # From the same start, the old way that ends far before the goal was the answer.
+    known = find_path(ask(make_terrain(waves)), replace(to_frontier, ends_at_first=True), memory)
+    np.testing.assert_allclose(known.path.poses[-1], GOAL, atol=1e-9)
 
 
 def test_unknown_ground_before_a_far_goal_leaves_the_budget_to_the_search(monkeypatch):
@@ -270,15 +274,6 @@ def test_unknown_ground_before_a_far_goal_leaves_the_budget_to_the_search(monkey
     half_known = make_terrain(lambda x, y: np.where(x > -1.0, np.nan, waves(x, y)))
     answer = find_path(ask(half_known, goal=(3.9, 0.0, 0.0)), replace(LONG, frontier=True))
     assert answer.outcome == FOUND and answer.path.poses[-1, 0] > -1.7
-
-
-def test_a_way_to_the_frontier_is_none_to_the_goal_once_that_is_known():
-    """From the same start, the old way that ends far before the goal was the answer."""
-    unseen = ask(make_terrain(lambda x, y: np.where(x > 1.475, np.nan, waves(x, y))))
-    memory, to_frontier = EdgeMemory(), replace(LONG, frontier=True, ends_at_first=True)
-    find_path(unseen, to_frontier, memory)
-    answer = find_path(ask(make_terrain(waves)), to_frontier, memory)
-    np.testing.assert_allclose(answer.path.poses[-1], GOAL, atol=1e-9)
 
 
 def test_turns_on_the_spot_need_no_nodes_and_are_taken_where_they_cost_less_than_the_curve():
