@@ -87,18 +87,13 @@ def test_repeated_waypoints_keep_the_motion_before_them():
     assert motions(np.zeros((3, 3))).tolist() == [[SPEED, 0.0, 0.0]] * 3
 
 
-def test_a_sideways_path_is_a_crab_for_a_rover_that_can():
+def test_a_sideways_path_is_a_crab_and_refused_by_wheel_and_angle_where_some_wheels_are_fixed():
     poses = poses_at(0.05 * np.arange(20), yaw=-0.5)
-    found = motions(poses, ALL_STEER)
     expected = SPEED * np.array([np.cos(0.5), np.sin(0.5), 0.0])
-    assert found == pytest.approx(np.tile(expected, (20, 1)), abs=1e-15)
+    assert motions(poses, ALL_STEER) == pytest.approx(np.tile(expected, (20, 1)), abs=1e-15)
     prediction, verdict = judge_path(ALL_STEER, LEVEL, poses)
     assert verdict.traversable
     assert prediction.steering_angle == pytest.approx(np.full((20, 6), 0.5))
-
-
-def test_a_crab_with_fixed_wheels_is_refused_by_wheel_and_angle():
-    poses = poses_at(0.05 * np.arange(20), yaw=-0.5)
     prediction, verdict = judge_path(LSR1, LEVEL, poses)
     assert verdict.code == "steering" and verdict.first_failure == 0
     assert verdict.reason.startswith("middle_right wheel does not steer: ")

@@ -75,16 +75,6 @@ def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(cours
     assert stopped.codes == verdict.codes[:count]
 
 
-def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monkeypatch):
-    """A sweep that took the end of a block for that of the path would refuse the fall."""
-    poses = straight(-3.0)
-    _, whole = judge_path(ROVER, GROUND, poses)
-    assert whole.traversable and whole.max_wheel_drop > 0.0
-    for block in (1, 2, 3, 5, 7, 11):
-        monkeypatch.setattr(sweep, "FIRST_BLOCK", block)
-        assert judge_path(ROVER, GROUND, poses, stop_at_failure=True)[1].traversable
-
-
 def steps_down(step: float) -> Terrain:
     """Return stairs down along x, 0.4 m from edge to edge, so that wheels fall again and again."""
     return make_terrain(lambda x, y: -step * np.floor(np.maximum(x + 4.0, 0.0) / 0.4), 0.04, 6.0)
