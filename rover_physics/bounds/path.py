@@ -36,6 +36,7 @@ from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
 from rover_physics.prediction.packed_model import PackedModel, forget_models
 from rover_physics.prediction.sweep import check_poses
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import (
     BOUNDED_VALUES,
     WAYPOINT_BOUNDS,
@@ -89,6 +90,24 @@ def is_uncertain(terrain: Terrain, sigmas: float | None) -> bool:
     return bool(sigmas) and terrain.elevation_std is not None
 
 
+def check_bounds(terrain: Terrain, options: SweepOptions) -> None:
+    """Check that there are bounds on a terrain with uncertain heights.
+
+    Raises:
+        ModelError: A terrain with too many soils, or policy "servo".
+    """
+    if options.policy == SERVO:
+        raise ModelError(
+            f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
+            f"sigmas, or use {EQUAL!r} or {OPTIMAL!r}"
+        )
+    if len(terrain.soil_names) >= MAX_SOILS:
+        raise ModelError(
+            f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
+            f"most {MAX_SOILS - 1}"
+        )
+
+
 def bound_path(model: PackedModel, prediction: PathPrediction, sigmas: float) -> PathBounds | None:
     """Bound a prediction along a path over a map with uncertain heights.
 
@@ -102,21 +121,12 @@ def bound_path(model: PackedModel, prediction: PathPrediction, sigmas: float) ->
         layer or there are no standard deviations.
 
     Raises:
-        ModelError: A terrain with too many soils, or policy "servo".
+        ModelError: As `check_bounds`.
     """
     terrain = model.terrain
     if not is_uncertain(terrain, sigmas):
         return None
-    if model.options.policy == SERVO:
-        raise ModelError(
-            f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
-            f"sigmas, or use {EQUAL!r} or {OPTIMAL!r}"
-        )
-    if len(terrain.soil_names) >= MAX_SOILS:
-        raise ModelError(
-            f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
-            f"most {MAX_SOILS - 1}"
-        )
+    check_bounds(terrain, model.options)
     grounds = _pack_grounds(terrain, sigmas)
     found = find_bounds(model, grounds, prediction.poses, prediction.results)
     for name in BOUNDED_VALUES:

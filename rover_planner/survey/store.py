@@ -183,6 +183,23 @@ class SurveyStore:
                 f"{chunk}; leave --chunk out to go on with it"
             )
 
+    def check_map(self) -> None:
+        """Check that a map that is not kept in the store is still the one of its survey.
+
+        Raises:
+            PlanningError: It has changed, or cannot be read.
+        """
+        source = self.open_map()
+        changed = (
+            isinstance(source, GeoTiffMap)
+            and source.hash_content() != self.notes.description["map"]
+        )
+        if changed:
+            raise PlanningError(
+                f"{show_file(self.notes.map_file)} has changed since {show_file(self.path)} was "
+                "made"
+            )
+
     def find_finished(self) -> set[Index]:
         """Return the chunks that are finished, and of which no file was lost since."""
         rows, columns = np.nonzero(self.layer(SECONDS)[:] >= 0.0)

@@ -82,6 +82,8 @@ def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     layers = {name: np.full(cells, value) for name, value in empty.items()}
     layers["worst_class"][:] = layers["best_class"][:] = IMPASSABLE
     layers["first_limit"][:] = number_limits()["unknown_ground"]
+    if request.chance:
+        layers["worst_failure_chance"][:] = layers["best_failure_chance"][:] = 1.0
     return layers
 
 

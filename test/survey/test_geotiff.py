@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
 
+import shutil
 import tracemalloc
 
 import numpy as np
@@ -87,6 +88,18 @@ def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
     heights = GeoTiffMap(path).read((slice(0, 30), slice(0, 40)))["elevation"]
     assert np.isnan(heights[26, 5]) and np.isnan(heights).sum() == 1
     assert heights[22, 9] == pytest.approx(113.0) and heights[0, 0] == pytest.approx(112.34)
+
+
+def test_cells_of_a_mask_and_of_a_nodata_value_are_unknown(tmp_path):
+    heights = np.ones((30, 40), np.float32)
+    heights[3, 5] = -9999.9
+    mask = np.full(heights.shape, 255, np.uint8)
+    mask[7, 9] = 0
+    path = write_tif(tmp_path / "map.tif", heights, nodata=-9999.9)
+    with rasterio.open(path, "r+") as file:
+        file.write_mask(mask)
+    found = GeoTiffMap(path).read((slice(0, 30), slice(0, 40)))["elevation"][::-1]
+    assert np.argwhere(np.isnan(found)).tolist() == [[3, 5], [7, 9]]
 
 
 @pytest.mark.filterwarnings("ignore:The given matrix is equal to Affine.identity")
@@ -206,6 +219,18 @@ def test_the_page_gets_the_map_that_was_surveyed_and_not_one_that_has_changed(tm
     write_tif(path, heights[::-1] + 1, nodata=np.nan)
     with pytest.raises(PlanningError, match=r"map\.tif has changed since .*out was made"):
         load_map(tmp_path / "out", 10_000)
+
+
+def test_a_survey_goes_on_only_with_the_map_that_it_will_read(tmp_path):
+    heights = make_rough_map(20, 30).elevation.astype(np.float32)
+    first, moved = tmp_path / "map.tif", tmp_path / "moved.tif"
+    write_tif(first, heights, nodata=np.nan)
+    prepare_survey(make_request(), str(first), tmp_path / "out")
+    shutil.copy(first, moved)
+    assert prepare_survey(make_request(), str(moved), tmp_path / "out").chunks
+    write_tif(first, heights + 1, nodata=np.nan)
+    with pytest.raises(PlanningError, match=r"map\.tif has changed since .*out was made"):
+        prepare_survey(make_request(), str(moved), tmp_path / "out")
 
 
 def test_a_damaged_block_is_refused_in_words_of_its_own(tmp_path):
