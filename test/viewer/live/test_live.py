@@ -37,6 +37,7 @@ from rover_planner.viewer.live.live_state import (
     describe_learned,
     read_state,
 )
+from support.messages import odometry_at
 from support.paths import poses_at
 from support.rovers import LSR1
 from support.waiting import repeat_until, wait_until
@@ -66,11 +67,9 @@ def talker(ros, listener) -> SimpleNamespace:
     return SimpleNamespace(**made)
 
 
-def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
-    message = Odometry()
-    place = message.pose.pose.position
-    place.x, place.y, place.z = x, y, z
-    message.twist.twist.linear.x = speed
+def odometry(x=1.0, y=2.0) -> Odometry:
+    message = odometry_at((x, y, 0.0), height=0.3)
+    message.twist.twist.linear.x = 0.05
     return message
 
 
