@@ -9,7 +9,6 @@ from rover_physics.names import WHEELS
 from rover_planner.cli import main
 from rover_planner.command.prediction_files import read_prediction
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import read_assumptions
 from support.command_line import N, assert_refused, predict_arguments, write_ground_and_path
 from support.grounds import with_std
 from support.paths import poses_at
@@ -192,6 +191,7 @@ def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monke
     ("changes", "names"),
     [
         ({"reason": None}, "no array reason; it has "),
+        ({"assumptions": np.str_('{"rover": "lsr1"}')}, "assumptions are invalid"),
         ({"assumptions": np.float64(1.0)}, "assumptions is of type float64; it must hold texts"),
         ({"roll": np.float64(1.0)}, r"roll has shape \(\); it must be \(30,\)"),
         ({"settled": np.zeros(N)}, "settled is of type float64; it must hold bools"),
@@ -206,13 +206,3 @@ def test_a_file_of_other_shapes_or_types_is_refused(files, changes, names):
     np.savez(files / "bad.npz", **{key: one for key, one in changed.items() if one is not None})
     with pytest.raises(PlanningError, match=names):
         read_prediction(files / "bad.npz")
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", '{"rover": "lsr1"}', '{"rover": "lsr1", "policy": "equal", "friction": NaN}',
-     '{"rover": "lsr1", "policy": "equal", "colour": "red"}'],
-)  # fmt: skip
-def test_damaged_assumptions_are_refused(text):
-    with pytest.raises(PlanningError, match="assumptions are invalid"):
-        read_assumptions(text)

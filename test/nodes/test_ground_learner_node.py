@@ -2,8 +2,8 @@
 """The node ground_learner tells what a drive over ROS shows, and stops a rover that is stuck."""
 
 import json
-import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ from support.learning_drives import climb
 from support.messages import row_messages
 from support.ros_fixtures import RosRun, hear
 from support.rovers import LSR1
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 SLOPE = 0.3
 BEGIN = 1_700_000_000.0
@@ -76,23 +76,13 @@ class Rover(Node):
 
 
 def drive(node: ground_learner.GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
-    """Send rows; the last of each few is sent again if it is lost on the way."""
+    """Send rows; the last of each few is sent until it has arrived."""
     for begin in range(0, len(rows), AT_ONCE):
-        some = rows[begin : begin + AT_ONCE]
-        for row in some[:-1]:
+        *others, last = rows[begin : begin + AT_ONCE]
+        for row in others:
             rover.send(row)
-        sent = 0.0
-
-        def arrives(row: np.ndarray = some[-1]) -> bool:
-            nonlocal sent
-            if node.heard_until > BEGIN + row[TIME] - 0.05:
-                return True
-            if time.monotonic() > sent + 0.5:
-                rover.send(row)
-                sent = time.monotonic()
-            return False
-
-        wait_until(arrives, "the odometry")
+        until = BEGIN + last[TIME] - 0.05
+        repeat_until(partial(rover.send, last), lambda t=until: node.heard_until > t, "odometry")
 
 
 def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place_marked(ros):

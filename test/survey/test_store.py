@@ -130,15 +130,11 @@ def test_two_commands_do_not_write_into_one_store(files):
         pass
 
 
-def test_a_missing_layer_is_named(files):
-    path = prepare(files).store.path
-    shutil.rmtree(path / "worst_tilt")
-    with pytest.raises(PlanningError, match="worst_tilt is damaged .*survey again"):
-        SurveyStore(path)
-
-
-def test_a_store_of_another_format_is_refused(files):
+def test_a_missing_layer_is_named_and_so_is_another_format(files):
     store = prepare(files).store
+    shutil.rmtree(store.path / "worst_tilt")
+    with pytest.raises(PlanningError, match="worst_tilt is damaged .*survey again"):
+        SurveyStore(store.path)
     store._group.attrs[NOTES] = store._group.attrs[NOTES] | {"format": 1}
     with pytest.raises(PlanningError, match="a survey of format 1; it must be 2: survey again"):
         SurveyStore(store.path)

@@ -112,18 +112,11 @@ def test_the_rover_stops_in_half_a_second_while_a_question_is_in_work(
 
 
 def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
-    watching, client, monkeypatch
+    watching, client, monkeypatch, hold
 ):
     client.send_terrain(BLOCKED)
     client.wait_for_stop()
-    look, is_held, go_on = PathWatch._look, threading.Event(), threading.Event()
-
-    def look_late(*given):
-        is_held.set()
-        assert go_on.wait(60.0)
-        return look(*given)
-
-    monkeypatch.setattr(PathWatch, "_look", look_late)
+    is_held, go_on = hold(PathWatch, "_look")
     assert is_held.wait(20.0), "a look"
     wait_until(lambda: watching.watch._sight is not None, "what the next look is to look at")
     with monkeypatch.context() as blind:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A traverse server merges maps of both kinds, and fills the ground on which the rover stands."""
 
-import threading
 import time
 
 import numpy as np
@@ -41,20 +40,13 @@ def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, t
 
 @pytest.mark.timed
 def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
-    start_server, client, tmp_path, monkeypatch
+    start_server, client, tmp_path, hold
 ):
     file = tmp_path / "prior.npz"
     save_terrain(file, PRIOR)
     server = start_server(terrain_file=str(file), planner="fan")
     before = server.service.known_map.fingerprint
-    merge, began, go_on = MapKeeper.take, threading.Event(), threading.Event()
-
-    def take_later(keeper, *given):
-        began.set()
-        assert go_on.wait(60.0)
-        return merge(keeper, *given)
-
-    monkeypatch.setattr(MapKeeper, "take", take_later)
+    began, go_on = hold(MapKeeper, "take")
     client.send_cloud(terrain_to_point_cloud(make_terrain(wall_at(0.5)), "map"))
     assert began.wait(20.0), "the map"
     assert ask(client)[1]["map_hash"] == before

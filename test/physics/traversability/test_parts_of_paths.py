@@ -191,23 +191,21 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
     assert exposure == pytest.approx(prediction.time[-1], rel=0.01)
 
 
-GROUNDS = (bouldered, rocky, fractal)
-
-
-def random_course(rover, seed: int) -> tuple[Terrain, np.ndarray]:
+def random_course(rover, make, seed: int) -> tuple[Terrain, np.ndarray]:
     """Return a rough ground in the rover's size, and a straight path over it in any direction."""
-    rng, ground = np.random.default_rng(seed), GROUNDS[seed % len(GROUNDS)](seed)
+    rng, ground = np.random.default_rng(seed), make(seed)
     yaw, (x, y) = rng.uniform(-np.pi, np.pi), rng.uniform(-0.4, 0.4, 2)
     return scaled_for(rover, ground, straight(y, 1.0, x, yaw))
 
 
 @pytest.mark.parametrize(
-    ("name", "seed", "friction"), [("lsr1", 34, 1.0), ("lsr1", 830, 0.3), ("m2020", 230, 0.3)]
+    ("name", "make", "seed", "friction"),
+    [("lsr1", rocky, 34, 1.0), ("lsr1", fractal, 830, 0.3), ("m2020", fractal, 230, 0.3)],
 )
-def test_twice_as_many_waypoints_change_no_verdict(name, seed, friction):
+def test_twice_as_many_waypoints_change_no_verdict(name, make, seed, friction):
     """Each of them hid a peak of friction, or the begin of a fall, between its waypoints."""
     rover = load_rover(name)
-    terrain, path = random_course(rover, seed)
+    terrain, path = random_course(rover, make, seed)
     middles = 0.5 * (path[1:] + path[:-1])
     refined = np.insert(path, np.arange(1, len(path)), middles, axis=0)
     coarse, fine = (

@@ -76,9 +76,6 @@ def test_without_time_for_the_rest_the_report_ends_at_the_failure(full, monkeypa
 
 
 def test_a_refusal_says_why_and_nothing_of_a_path():
-    assert refusal("no_map", "no map was received yet").report.to_dict() == {
-        "traversable": False,
-        "code": "no_map",
-        "reason": "no map was received yet",
-        "first_failure": -1,
-    }
+    told = refusal("no_map", "no map yet").report.to_dict()
+    why = {"traversable": False, "code": "no_map", "reason": "no map yet", "first_failure": -1}
+    assert told == why

@@ -19,7 +19,7 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation
-from support.grounds import enlarged, make_terrain, plane, rocky, waves
+from support.grounds import enlarged, make_terrain, plane, raised, rocky, waves
 from support.paths import arc_of, poses_at
 from support.rovers import FIXED, LSR1, similar
 
@@ -261,8 +261,7 @@ def test_a_rover_of_any_size_and_speed_backs_off_by_as_many_wheel_radii(size, no
 
 
 def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_not_see_it():
-    hole = lambda x, y: waves(x, y) + np.where(np.hypot(x, y) < 0.3, np.nan, 0.0)  # noqa: E731
-    ground = make_terrain(hole, half=3.0)
+    ground = raised(WAVY, np.s_[55:66, 55:66], np.nan)
     given = RoverSimulatorParameters(start_x=-0.6)
     simulation = Simulation(LSR1, ground, given)
     drive(simulation.plant, 13.0)
