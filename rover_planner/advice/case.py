@@ -115,8 +115,9 @@ class Case:
 
 
 def case_of(site: Site, poses: Floats) -> Case:
-    """Return the case of a path that was judged."""
-    accepted = min(site.options.accepted_chance, ACCEPTED_CHANCE)
+    """Return the case of a path that was judged; what is advised has an accepted chance."""
+    asked = site.options.asked_chance
+    accepted = ACCEPTED_CHANCE if asked is None else asked
     options = site.options.change(accepted_chance=accepted, waypoint_spacing=0.0)
     return Case(replace(site, options=options), poses)
 

@@ -11,15 +11,17 @@ import pytest
 
 from rover_physics import judge_path
 from rover_physics.rover.steering_joints import tightest_radius
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
-from rover_planner.advice.case import SEARCH, Case
+from rover_planner.advice.case import SEARCH, Case, case_of
 from rover_planner.advice.levers import LEVERS, Choice
 from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
+from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.site import Site
 from support.grounds import enlarged, make_terrain, rock_left
 from support.rovers import FIXED, LSR1, M2020, similar
@@ -56,6 +58,13 @@ def advise_on(name: str) -> tuple[Advice, set[str]]:
     single = takewhile(lambda one: len(one.tried) < 2, grow_advice(refused_by(height, **options)))
     *_, advice = single
     return advice, levers
+
+
+@pytest.mark.parametrize("asked, accepted", [(0.0, 0.0), (0.2, 0.2), (1.0, ACCEPTED_CHANCE)])
+def test_remedies_have_the_chance_that_is_accepted_or_else_the_usual_one(asked, accepted):
+    options = PathQueryOptions(accepted_chance=asked)
+    case = case_of(Site(LSR1, make_terrain(slope), options), STRAIGHT)
+    assert case.site.options.accepted_chance == accepted
 
 
 @pytest.fixture(params=CASES)

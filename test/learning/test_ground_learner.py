@@ -59,6 +59,7 @@ def test_ground_is_marked_where_wheels_have_been():
     assert known.any() and np.abs(y + 0.04 * rows).min() > 0.2
     assert np.abs(x + 0.04 * columns).max() < 1.4
     assert (learner.layers[1][known] > 0.0).all()
+    assert (learner.layers[0][known] <= ROVER.friction).all()  # all grip: it is told, no more
 
 
 def test_wheels_that_slip_on_one_class_of_ground_tell_all_of_it_and_nothing_of_another():

@@ -448,8 +448,8 @@ def _check_end(name: str, end: ArrayLike, terrain: Terrain | None) -> Pose:
     if terrain is not None and not terrain.contains(pose[0], pose[1]):
         xmin, xmax, ymin, ymax = terrain.bounds
         raise PlanningError(
-            f"{name} is at ({pose[0]:g}, {pose[1]:g}), off the map, which goes from x {xmin:g} to "
-            f"{xmax:g} and y {ymin:g} to {ymax:g} m"
+            f"{name} is at ({pose[0]:.10g}, {pose[1]:.10g}), off the map, which goes from "
+            f"x {xmin:.10g} to {xmax:.10g} and y {ymin:.10g} to {ymax:.10g} m"
         )
     return pose
 
