@@ -59,10 +59,11 @@ MOST_STICKING = 0.3
 and slips by turns; its mean shear is then below the friction."""
 MAX_UNSTEADY = 0.1
 """Acceleration of the treads, over gravity, from which a window does not count."""
-SAME_PLACE = 0.5
+SAME_PLACE = 1.0
 """Distance of a wheel, over its radius, within which its measurements are not independent."""
-AT_A_PLACE = 1.0
-"""Number of independent measurements that a wheel makes at one place."""
+AT_A_PLACE = 2.0
+"""Number of independent measurements that a wheel makes at one place, however long it is there:
+half of the variance of their errors is common."""
 SAME_TIME = 0.2
 """Time within which its measurements are not independent, either [s]."""
 LEAST_NOISE, FLUCTUATION_NOISE = 0.10, 0.4
@@ -367,6 +368,7 @@ class GroundLearner:
             if len(told):
                 load, doubt = float(loads[told].sum()), window.doubts[told].sum()
                 noise = math.hypot(*noises[told], doubt, HIDDEN_SHARE * beyond) / load
+                noise = max(noise, _find_scatter(shears[told], loads[told]))
                 one.slip(float(shears[told].sum()) / load, noise, float(weights[told].mean()))
             held = np.sort((proved / np.maximum(loads, 1e-9))[proves & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong
@@ -384,14 +386,15 @@ class GroundLearner:
         return fluctuation, spread / np.sqrt(count) / self._rover.wheel.radius
 
     def _weigh(self, window: SlipWindow, tells: Flags, elapsed: float) -> Floats:
-        """Return (6,) numbers of independent measurements; at one place they tell less and less.
+        """Return (6,) numbers of independent measurements; at one place they come to an end.
 
         What is wrong at a place, such as the slope of the contact, stays wrong.
         """
         away = np.hypot(*(window.places - self._spot).T) > SAME_PLACE * self._rover.wheel.radius
         self._spot = np.where(away[:, None], window.places, self._spot)
         self._here = np.where(away, 0.0, self._here)
-        weights = min(elapsed / SAME_TIME, 1.0) * np.exp(-self._here / AT_A_PLACE)
+        left = np.maximum(1.0 - self._here / AT_A_PLACE, 0.0)
+        weights = min(elapsed / SAME_TIME, 1.0) * left
         self._here = self._here + np.where(tells, weights, 0.0)
         return np.asarray(weights)
 
@@ -445,6 +448,16 @@ def _add(row, elapsed, rates, turned, blocks):
         block.turned[wheel] += turned[wheel]
         if np.isfinite(torque):
             block.squares[wheel] += torque * torque
+
+
+def _find_scatter(shears: Floats, loads: Floats) -> float:
+    """Return the relative standard deviation of the sum of the shears over that of the loads.
+
+    Wheels on one ground tell one friction; how they disagree tells the errors of their loads.
+    """
+    count, shear = len(shears), shears.sum()
+    rest = shears - loads * (shear / loads.sum())
+    return float(np.sqrt(count / max(count - 1, 1) * (rest @ rest)) / shear)
 
 
 def _find_change(values: Floats) -> float:
