@@ -178,6 +178,7 @@ class GroundLearner:
         self._forward = np.ones(WHEEL_COUNT)
         self._slipping = np.zeros(WHEEL_COUNT, dtype=int)
         self._rates, self._place = np.zeros(WHEEL_COUNT), (-math.inf, 0.0, 0.0)
+        self._way = 0.0
         self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
         self._marked, self._mark_time = np.full((WHEEL_COUNT, 2), np.inf), -math.inf
         self._time = -math.inf
@@ -352,7 +353,7 @@ class GroundLearner:
         sticking = fluctuation * (1.0 - np.abs(window.ratio))
         is_clear = (sticking < MOST_STICKING) & (window.doubts < MOST_DOUBT * loads)
         tells = slips & counts & is_clear & (along > ALONG) & (window.slip * tractions > 0.0)
-        distance = abs(float(find_median(window.travel))) * elapsed
+        distance = self._go_on(window, elapsed)
         weights = self._weigh(window, tells, elapsed)
         beyond = abs(window.excess - float((window.tractions - tractions).sum()))
         most = np.maximum(GRIP_SHARE * np.abs(window.rolling), self._least_slip)
@@ -384,6 +385,18 @@ class GroundLearner:
         spread = np.sqrt(np.maximum(squares - torques**2, 0.0))
         fluctuation = spread / np.maximum(np.abs(torques), 1e-9)
         return fluctuation, spread / np.sqrt(count) / self._rover.wheel.radius
+
+    def _go_on(self, window: SlipWindow, elapsed: float) -> float:
+        """Return the distance to a new place [m], 0 before it is reached.
+
+        A rover that is stuck reaches none, however it trembles.
+        """
+        self._way += float(find_median(window.travel)) * elapsed
+        distance = abs(self._way)
+        if distance < SAME_PLACE * self._rover.wheel.radius:
+            return 0.0
+        self._way = 0.0
+        return distance
 
     def _weigh(self, window: SlipWindow, tells: Flags, elapsed: float) -> Floats:
         """Return (6,) numbers of independent measurements; at one place they come to an end.

@@ -102,7 +102,7 @@ def test_torques_beyond_what_holds_the_rover_make_a_slip_tell_less_surely():
     rows[start:, grips] *= 1.5  # as where wheels push a face that the map lacks
     pushed = learn(rows).estimate.friction
     assert held.low < SLOPE < held.high and pushed.low < SLOPE < pushed.high
-    assert pushed.high / pushed.low > 1.08 * held.high / held.low
+    assert pushed.high / pushed.low > 1.05 * held.high / held.low
 
 
 def test_a_wheel_that_slips_at_one_place_tells_soon_all_that_it_can_tell():
@@ -110,7 +110,8 @@ def test_a_wheel_that_slips_at_one_place_tells_soon_all_that_it_can_tell():
     rows[:, RATES] = [0.6, 0.0, 0.0, 0.0, 0.0, 0.0]
     soon, late = learn(rows[:50]).estimate.friction, learn(rows).estimate.friction
     assert soon.low < SLOPE < soon.high
-    assert late.high / late.low > 0.99 * soon.high / soon.low
+    assert late.high / late.low == pytest.approx(soon.high / soon.low, rel=0.01)
+    assert late.std == pytest.approx(soon.std, rel=0.01)
 
 
 def test_wheels_that_disagree_about_the_friction_tell_it_less_surely():
