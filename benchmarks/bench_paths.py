@@ -27,10 +27,11 @@ from rover_physics import (
 from rover_physics.names import EQUAL, SERVO
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command.prediction_files import read_poses, write_prediction
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.site import Site
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.grounds import make_terrain, waves
-from support.rough_grounds import bouldered
+from support.grounds import bouldered, make_terrain, waves
 
 REPEATS = 7
 """Repeats of a measurement."""
@@ -131,7 +132,8 @@ def measure_question(
 ) -> Figure:
     """Measure a question of 10 m with a number of candidates and an accepted chance."""
     options = PathQueryOptions(count=count, accepted_chance=accepted)
-    taken = median_time(lambda: answer_path_query(rover, mars, START, GOAL, options), REPEATS)
+    judge = PathJudge(Site(rover, mars, options))
+    taken = median_time(lambda: judge.search(START, GOAL), REPEATS)
     name = f"question of 10 m, {count} candidate{'s' if count > 1 else ''}"
     name += f", chance up to {accepted:g}" if accepted < 1.0 else ""
     return Figure("paths", name, 1e3 * taken, "ms", most, repeats=REPEATS)

@@ -10,12 +10,10 @@ from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 
 from benchmarks.measure import Figure
-from benchmarks.processes import START_TIME, open_nodes
-from rover_physics import save_terrain
+from benchmarks.processes import CONTROLLER, SERVER, START_TIME, STOP_TIMEOUT, open_nodes
 from rover_planner.demo.child_process import ChildProcess
 from rover_planner.ros.qos import topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.project.launch_files import simulation_commands
 from support.waiting import wait_until
 
 SETTLING, SECONDS = 8.0, 30.0
@@ -25,6 +23,11 @@ MOST = {"traverse_server": 3.0, "traction_controller": 8.0, "rover_simulator": 1
 """Aimed at, in percent of a core."""
 SPEED, COMMAND_PERIOD = 0.06, 0.1
 """Speed of the drive [m/s], and the time between two commands [s]."""
+SIMULATED = {
+    "enabled_at_start": True, "stop_timeout": STOP_TIMEOUT,
+    "joint_states_timeout": 0.2, "imu_timeout": 0.2, "watchdog_timeout": 0.2,
+}  # fmt: skip
+"""Parameters of the controller beside a simulator, as in the launch files."""
 GROUND = make_mars_terrain(1, 24.0, 0.05, rock_cover=0.01)
 
 
@@ -35,10 +38,13 @@ def measure() -> list[Figure]:
 
 def _measure_rest() -> list[Figure]:
     with open_nodes() as nodes:
-        terrain = nodes.folder / "ground.npz"
-        save_terrain(terrain, GROUND)
-        commands = simulation_commands(terrain_file=str(terrain))
-        found = {name: nodes.start_module(*words[2:]) for name, words in commands.items()}
+        found = {
+            "rover_simulator": nodes.start(
+                "rover_simulator", terrain_file=GROUND, follow_commands=True
+            ),
+            SERVER: nodes.start(SERVER, monitor=True),
+            CONTROLLER: nodes.start(CONTROLLER, **SIMULATED),
+        }
         graph = nodes.client().connect().node
         wait_until(lambda: set(found) <= set(graph.get_node_names()), "all programs", START_TIME)
         return _watch(found, "at rest")

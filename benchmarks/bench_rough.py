@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.grounds import poses_anywhere
 from benchmarks.measure import Figure
 from rover_physics import Rover, Terrain, judge_poses, load_rover
-from support.rough_grounds import fractal
+from support.grounds import fractal
 from support.rover_geometry import wheel_gaps
 
 LOOKED_AT = 150

@@ -19,7 +19,9 @@ from benchmarks.measure import Figure, median_times
 from benchmarks.processes import ECHO, SERVER, open_nodes
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics import Terrain, load_rover
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.site import Site
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
@@ -39,7 +41,7 @@ ASKERS = (("after a pause", 0.03, 1), ("at once", 0.0, 20))
 def measure() -> list[Figure]:
     """Measure one path with and without a pause, a fan of nine, and a map message."""
     rover, ground = load_rover("lsr1"), make_mars_terrain(1, 24.0, 0.05)
-    options, figures = PathQueryOptions(count=1), []
+    judge, figures = PathJudge(Site(rover, ground, PathQueryOptions(count=1))), []
     with open_nodes() as nodes:
         nodes.start(SERVER, terrain_file=ground, candidate_count=1)
         client = nodes.client()
@@ -50,7 +52,7 @@ def measure() -> list[Figure]:
         responders: dict[str, Callable[[], object]] = {
             "server": lambda: client.plan(START, GOAL),
             "echo": lambda: client.plan(START, GOAL, node=ECHO),
-            "computation": lambda: answer_path_query(rover, ground, START, GOAL, options),
+            "computation": lambda: judge.search(START, GOAL),
         }
         for name, pause, in_a_row in ASKERS:
             times = ask_in_turns(responders, pause, in_a_row)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times how soon ~/stop is heard after a map with a rock across the watched path was published.
+"""Times how soon ~/stop is heard after a map with a wall across the watched path was published.
 
 The server runs in a process of its own. The first stop of the process and the median of the others
 count, each for maps of several sizes, exact and with standard deviations.
@@ -11,10 +11,8 @@ from statistics import median
 from benchmarks.measure import Figure
 from benchmarks.processes import SERVER, START_TIME, open_nodes
 from msg_adapters.elevation import terrain_to_point_cloud
-from support.grounds import make_terrain, waves
-from support.planner_client import PlannerClient
-from support.rough_grounds import with_std
-from support.standing_rover import GOAL, START, StandingRover, rock_ahead
+from support.grounds import make_terrain, wall_at, waves, with_std
+from support.planner_client import GOAL, START, PlannerClient
 from support.waiting import wait_until
 
 MAPS = ((6.0, 0.05, 0.0), (6.0, 0.05, 0.001), (15.0, 0.02, 0.0), (15.0, 0.02, 0.001))
@@ -31,16 +29,16 @@ def measure() -> list[Figure]:
 
 def _measure(half: float, resolution: float, std: float) -> list[Figure]:
     clouds = []
-    for height in (waves, rock_ahead):
+    for height in (waves, wall_at(1.05)):
         ground = make_terrain(height, resolution, half)
         ground = with_std(ground, std) if std else ground
         clouds.append(terrain_to_point_cloud(ground, "map"))
     with open_nodes() as nodes:
         client = nodes.ros.spin(PlannerClient(nodes.ros))
-        rover = nodes.ros.spin(StandingRover(nodes.ros))
+        client.stand(START)
         nodes.start(SERVER, monitor=True, monitor_timeout=60.0)
-        wait_until(lambda: rover.stops, "the server", START_TIME)
-        delays = [_time_stop(client, rover, clouds) for _ in range(REPEATS)]
+        wait_until(lambda: client.stops, "the server", START_TIME)
+        delays = [_time_stop(client, clouds) for _ in range(REPEATS)]
     cells, later = f"{ground.elevation.size:,} cells", delays[1:]
     cells += ", with elevation_std" if std else ""
     return [
@@ -49,14 +47,14 @@ def _measure(half: float, resolution: float, std: float) -> list[Figure]:
     ]
 
 
-def _time_stop(client: PlannerClient, rover: StandingRover, clouds: list) -> float:
+def _time_stop(client: PlannerClient, clouds: list) -> float:
     """Have a path accepted, block it, and return the time until the stop is heard [ms]."""
     client.logs.clear()
     client.send_cloud(clouds[0])
     wait_until(lambda: client.can_traverse(START, GOAL).poses, "a path")
-    rover.wait_for_stop(False)
+    client.wait_for_stop(False)
     time.sleep(0.3)
     sent = time.monotonic()
     client.send_cloud(clouds[1])
-    rover.wait_for_stop()
-    return 1e3 * (next(at for stops, at in rover.stops if stops and at > sent) - sent)
+    client.wait_for_stop()
+    return 1e3 * (next(at for stops, at in client.stops if stops and at > sent) - sent)

@@ -21,8 +21,8 @@ from rover_physics.traction.contact_ekf import Motion
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.grounds import rocky
 from support.ros_fixtures import RosRun, hear
-from support.rough_grounds import rocky
 from support.traction_states import drive_states
 from support.waiting import wait_until
 

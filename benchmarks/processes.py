@@ -38,6 +38,8 @@ DOMAIN = 101 + os.getpid() % 100
 """A ROS domain that tests do not use."""
 START_TIME = 300.0
 """Longest wait for a node or its first answer [s]; it may have to compile."""
+STOP_TIMEOUT = 0.4
+"""Time without the watch after which a controller stops the rover, as in the launch files [s]."""
 ATTEMPTS = 15
 """Times that a response is asked for that may be lost, 2 s each."""
 

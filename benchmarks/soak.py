@@ -21,7 +21,7 @@ import time
 from collections import Counter
 from pathlib import Path
 from statistics import median
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -33,7 +33,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray, String
 
-from benchmarks.processes import START_TIME, NodeProcesses, memory_of, open_nodes
+from benchmarks.processes import START_TIME, STOP_TIMEOUT, NodeProcesses, memory_of, open_nodes
 from benchmarks.stepped_clock import SteppedClock
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics import save_terrain
@@ -41,7 +41,6 @@ from rover_planner.demo.child_process import ChildProcess
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.checkout import TOP
-from support.project.launch_files import simulation_commands
 from support.ros_fixtures import RosRun, finish
 from support.waiting import wait_until
 
@@ -138,22 +137,27 @@ class Programs:
     def __init__(self, nodes: NodeProcesses, terrain: Path):
         self._nodes, self.clock = nodes, SteppedClock(nodes.folder)
         self.running: dict[str, ChildProcess] = {}
-        rests = self._write("simulated_traction_controller", rest_policy="brake")  # no torques
-        maps = self._write("traverse_server", map_folder=str(nodes.folder))
-        commands = simulation_commands(
-            terrain_file=str(terrain),
-            speed="0.08",
-            rover_simulator_parameters=self._write("rover_simulator"),
-            traction_controller_parameters=rests,
-            traverse_server_parameters=maps,
-        )
-        self._modules = {name: words[2:] for name, words in commands.items()}  # behind python -m
+        files = {
+            "rover_simulator": self._write(
+                "rover_simulator", terrain_file=str(terrain), speed=0.08
+            ),
+            "traverse_server": self._write(
+                "traverse_server", map_folder=str(nodes.folder), monitor=True
+            ),
+            "traction_controller": self._write(
+                "simulated_traction_controller", rest_policy="brake", stop_timeout=STOP_TIMEOUT
+            ),  # at rest there are no torques
+        }
+        self._modules = {
+            name: [f"rover_planner.nodes.{name}", "--ros-args", "--params-file", file]
+            for name, file in files.items()
+        }
         page = [PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
         self._modules[PAGE] = ["rover_planner", *page]
         for name in self._modules:
             self.start(name)
 
-    def _write(self, stem: str, **values: str) -> str:
+    def _write(self, stem: str, **values: Any) -> str:
         """Write a parameter file of the package with other values; return its name."""
         content = yaml.safe_load((PARAMETERS / f"{stem}.yaml").read_text())
         content["/**"]["ros__parameters"] |= {"realtime_priority": PRIORITY} | values

@@ -33,7 +33,7 @@ from rover_physics.prediction.evaluation import new_work, stand
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.traversability.verdict import hold_against_limits
 from support.paths import arc_of, poses_at
-from support.reference_cases import DATA, reference_predictions, steered_predictions
+from support.reference_cases import DATA, STEERED, reference_predictions
 from support.reference_drives import KEPT, drive_ground, drive_path, unlimited
 
 PASSED = "passed"
@@ -258,7 +258,7 @@ def print_traces() -> None:
 def print_bands() -> None:
     """Print the bands in which friction leaves the loads of turned wheels that stand still."""
     rover, bands, loads = load_rover("lsr1"), [], []
-    for case, found in steered_predictions():
+    for case, found in reference_predictions(STEERED):
         model = pack_model(rover, case.terrain, SweepOptions()).record
         for i, pose in enumerate(case.poses):
             work = new_work()
@@ -319,7 +319,7 @@ def main(
 ) -> None:
     """Print all tables."""
     print_settled("Settled cases", reference_predictions())
-    print_settled("Settled with turned wheels", steered_predictions())
+    print_settled("Settled with turned wheels", reference_predictions(STEERED))
     print_bands()
     for policy in ("optimal", "servo", "equal"):
         with console(stderr=True).status(f"drives, {policy}"):

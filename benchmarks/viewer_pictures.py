@@ -18,7 +18,7 @@ from rover_planner.viewer.state.scenario import Pose, Scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.viewer.browser import Visitor, open_browser
-from support.viewer.sessions import is_at_rest
+from support.viewer.sessions import wait_for_rest
 from support.viewer.sessions import wait_patiently as wait_until
 
 SETTLE = 10.0
@@ -58,7 +58,7 @@ def _write(browser: Any, file: Path) -> str:
     session = ViewSession(Scenario(rover, rover, ground, *(ends or choose_ends(rover, ground))))
     page = Page(session, ground_name=name)
     try:
-        wait_until(lambda: is_at_rest(page), "the verdicts")
+        wait_for_rest(page)
         visitor = Visitor(browser, page.url, scale=1.0)
         _close_notice(visitor)
         shows = _show_drive(page) if file.name == "viewer.png" else _show_failure(page, visitor)
@@ -87,7 +87,7 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
             continue
         page.hear({"ask": "show", "index": index})
         wait_until(lambda index=index: session.shown.index == index, "the path")
-        wait_until(lambda: is_at_rest(page), "its verdicts")
+        wait_for_rest(page)
         failure = session.shown.path.failure
         if failure is not None and failure.link in WHEELS:
             visitor.press("Go to the failure")

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics import SweepOptions, Terrain, load_rover, load_terrain
+from rover_physics import Terrain, load_rover, load_terrain
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.figures.advice_picture import draw_advice
+from rover_planner.planning.search.site import Site
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 rover = load_rover("lsr1")
@@ -31,9 +32,9 @@ rock = Terrain(0.3 * np.exp(-((x - 0.2) ** 2 + (y - 0.2) ** 2) / 0.02), 0.05, (-
 slope = Terrain(0.3 * x, 0.05, (-3.0, -3.0))
 ahead = line(-1.5, 0.0, 0.0, 3.0)
 cases = {
-    "spirit": Case(rover, load_terrain("spirit"), line(-44.4, -19.4, -2.5, 2.0)),
-    "rock": Case(rover, rock, ahead),
-    "payload": Case(rover, slope, ahead, SweepOptions(payload=4.0)),
+    "spirit": Case(Site(rover, load_terrain("spirit")), line(-44.4, -19.4, -2.5, 2.0)),
+    "rock": Case(Site(rover, rock), ahead),
+    "payload": Case(Site(rover, slope), ahead).change(payload=4.0),
 }
 for name, case in cases.items():
     *_, advice = grow_advice(case)

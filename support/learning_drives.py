@@ -12,7 +12,6 @@ from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.learning import drive_log as log
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.simulation import Plant
-from support.rough_grounds import plane
 
 RATE = 50.0
 """Rows per second."""
@@ -72,11 +71,6 @@ def row_of_plant(plant: Plant, time: float) -> Floats:
     row[log.STEERING] = [state.joint_positions.get(name, 0.0) for name in STEERING_JOINTS]
     row[log.TORQUES] = state.wheel_torques
     return row
-
-
-def ramp(slope: float) -> Terrain:
-    """Return the plane z = `slope` x, large enough for a climb."""
-    return plane(slope, 0.0, half=3.0)
 
 
 def write_csv(path: Path, rows: Floats, names: list[str] = NAMES) -> None:

@@ -13,6 +13,7 @@ from geometry_msgs.msg import PoseStamped, TransformStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from msg_adapters.paths import stamped_pose
 from msg_adapters.stamps import ns_to_stamp
@@ -46,16 +47,14 @@ def odometry_at(pose, height: float = 0.0, frame: str = "map") -> Odometry:
 
 def make_target(x=1.0, y=2.0, z=0.3, frame="map") -> PoseStamped:
     """Return a target position for the tip of the arm [m]."""
-    target = PoseStamped()
-    target.header.frame_id = frame
+    target = PoseStamped(header=Header(frame_id=frame))
     target.pose.position.x, target.pose.position.y, target.pose.position.z = x, y, z
     return target
 
 
 def make_wrench(force=(1.0, 2.0, 3.0), moment=(4.0, 5.0, 6.0), frame="map") -> WrenchStamped:
     """Return force [N] and moment [N m] on the tip of the arm."""
-    wrench = WrenchStamped()
-    wrench.header.frame_id = frame
+    wrench = WrenchStamped(header=Header(frame_id=frame))
     for vector, values in ((wrench.wrench.force, force), (wrench.wrench.torque, moment)):
         vector.x, vector.y, vector.z = values
     return wrench
@@ -63,8 +62,8 @@ def make_wrench(force=(1.0, 2.0, 3.0), moment=(4.0, 5.0, 6.0), frame="map") -> W
 
 def transform_message(parent: str, child: str, rigid: Rigid, stamp: Time) -> TransformStamped:
     """Return the message that tells where a child frame is in its parent frame."""
-    message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = parent, stamp
+    header = Header(frame_id=parent, stamp=stamp)
+    message = TransformStamped(header=header, child_frame_id=child)
     place, turn = message.transform.translation, message.transform.rotation
     place.x, place.y, place.z = rigid.translation.tolist()
     turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()

@@ -13,10 +13,7 @@ def poses_at(x: ArrayLike, y: ArrayLike = 0.0, yaw: ArrayLike = 0.0) -> np.ndarr
 def arc_of(curvature: float, along: np.ndarray, yaw: float = 0.0) -> np.ndarray:
     """Return poses on an arc through the origin, where it has a heading `yaw` [rad].
 
-    Args:
-        curvature: Its curvature [1/m], positive to the left; 0 on a straight line.
-        along: (n,) way of each pose from the origin [m].
-        yaw: Heading at the origin [rad].
+    Its curvature [1/m] is positive to the left; `along` (n,) is the way of each pose [m].
     """
     turn = curvature * along
     chord, direction = along * np.sinc(0.5 * turn / np.pi), yaw + 0.5 * turn

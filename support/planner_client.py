@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client of the traverse server for tests: publishes, calls, and keeps the results."""
 
+import time
 from functools import cache, partial
 
 import pytest
@@ -13,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -22,7 +24,7 @@ from rover_physics.warm_up import warm_up
 from rover_planner.nodes import traverse_server
 from rover_planner.nodes.result_topics import RESULTS
 from rover_planner.nodes.traverse_server import TraverseServer
-from rover_planner.ros.qos import map_qos, result_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, map_qos, result_qos, topic_qos
 from rover_planner.shell import kernels
 from support.messages import odometry_at
 from support.ros_fixtures import RosRun, call
@@ -63,6 +65,9 @@ class PlannerClient(Node):
                 kind, f"{SERVER}/{topic}", partial(self._hear, topic), result_qos()
             )
         self.create_subscription(Log, "/rosout", lambda log: self.logs.append(log.msg), 100)
+        self.stops: list[tuple[bool, float]] = []
+        """Each stop heard, and when [s]."""
+        self.create_subscription(Bool, f"{SERVER}/stop", self._hear_stop, latched_qos())
         self._plan = self.create_client(GetPlan, f"{SERVER}/can_traverse")
         self._check = self.create_client(Trigger, f"{SERVER}/check_path")
         self._map = self.create_client(LoadMap, f"{SERVER}/load_map")
@@ -89,10 +94,6 @@ class PlannerClient(Node):
     def send_joints(self, names, positions) -> None:
         """Publish joint positions."""
         self.send(self._joints, JointState(name=list(names), position=list(positions)))
-
-    def send_odometry(self, pose, height=0.0) -> None:
-        """Publish odometry of a level pose (3,)."""
-        self.send(self._odometry, odometry_at(pose, height))
 
     def can_traverse(self, start, goal) -> Path:
         """Ask for a plan between two poses (3,)."""
@@ -140,6 +141,23 @@ class PlannerClient(Node):
         # A response that was lost is asked for again: the results of the first one may come late.
         wait_until(lambda: self._has_all() and all(self.heard.values()), "all results")
         return answer, {topic: messages[-1] for topic, messages in self.heard.items()}
+
+    def stand(self, pose, height=0.0) -> None:
+        """Publish odometry of a level pose (3,) from now on."""
+        odometry = odometry_at(pose, height)
+        self.create_timer(0.05, lambda: self._odometry.publish(odometry))
+
+    @property
+    def silence(self) -> float:
+        """Time since the last stop was heard [s]."""
+        return time.monotonic() - self.stops[-1][1]
+
+    def wait_for_stop(self, value: bool = True) -> None:
+        """Wait until the last stop has a value."""
+        wait_until(lambda: self.stops and self.stops[-1][0] == value, f"stop {value}")
+
+    def _hear_stop(self, stop: Bool) -> None:
+        self.stops.append((stop.data, time.monotonic()))
 
     def _hear(self, topic: str, message) -> None:
         self.heard[topic].append(message)

@@ -2,9 +2,8 @@
 """The settled cases of test/data, computed with MuJoCo: see test/data/README.md."""
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,8 @@ import numpy as np
 from rover_physics import PathPrediction, Terrain, judge_poses, load_rover
 
 DATA = Path(__file__).resolve().parents[1] / "test" / "data"
-FILES = ("settled_a.npz", "settled_b.npz")
-STEERED = ("steered.npz",)
-"""File of the cases with turned end wheels."""
+STRAIGHT, STEERED = ("settled_a", "settled_b"), ("steered",)
+"""Files of the cases with straight wheels, and with turned end wheels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +38,17 @@ class ReferenceGround:
 
 
 @lru_cache
-def reference_grounds(files: tuple[str, ...] = FILES) -> tuple[ReferenceGround, ...]:
-    """Return all grounds of files, by default those with straight wheels, with their cases."""
-    return tuple(ground for file in files for ground in _read_grounds(file))
-
-
-def _read_grounds(file: str) -> Iterator[ReferenceGround]:
-    with np.load(DATA / file) as entries:
-        meta = json.loads(str(entries["meta"]))
-        names = sorted({row["terrain"] for row in meta["rows"]})
-        for name in names:
-            rows = [row for row in meta["rows"] if row["terrain"] == name]
-            terrain = Terrain(entries[f"terrain_{name}"], meta["res"], tuple(meta["origin"]))
-            yield _read_cases(f"{file[:-4]}/{name}", terrain, rows)
+def reference_grounds(files: tuple[str, ...] = STRAIGHT) -> tuple[ReferenceGround, ...]:
+    """Return all grounds of files with their cases."""
+    found = []
+    for file in files:
+        with np.load(DATA / f"{file}.npz") as entries:
+            meta = json.loads(str(entries["meta"]))
+            for name in sorted({row["terrain"] for row in meta["rows"]}):
+                rows = [row for row in meta["rows"] if row["terrain"] == name]
+                terrain = Terrain(entries[f"terrain_{name}"], meta["res"], tuple(meta["origin"]))
+                found.append(_read_cases(f"{file}/{name}", terrain, rows))
+    return tuple(found)
 
 
 def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGround:
@@ -73,7 +69,7 @@ def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGrou
 
 @lru_cache
 def reference_predictions(
-    files: tuple[str, ...] = FILES,
+    files: tuple[str, ...] = STRAIGHT,
 ) -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
     """Return the model's predictions for all cases of files under equal torques."""
     rover = load_rover("lsr1")
@@ -81,10 +77,6 @@ def reference_predictions(
         (case, judge_poses(rover, case.terrain, case.poses, case.curvature)[0])
         for case in reference_grounds(files)
     )
-
-
-steered_predictions = partial(reference_predictions, STEERED)
-"""Returns the predictions for the cases with turned wheels."""
 
 
 def reference_ground(label: str) -> ReferenceGround:

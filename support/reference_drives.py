@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics import Rover, Terrain
+from support.grounds import bouldered, fractal
 from support.paths import poses_at
-from support.rough_grounds import bouldered, fractal
 
 RESOLUTION = 0.02
 """Cell size of the grounds [m]."""

@@ -66,10 +66,6 @@ class RosRun:
         given = [Parameter(name, value=value) for name, value in values.items()]
         return self.spin(kind(context=self.context, cli_args=[*words], parameter_overrides=given))
 
-    def is_alive(self, node: Node) -> bool:
-        """Return whether a node is still being spun; an exception in a callback ends spinning."""
-        return any(thread.is_alive() for other, _, thread in self._spinning if other is node)
-
     def close(self) -> None:
         """End all nodes and the context, unless a test has shut that down."""
         self._ending.set()

@@ -83,20 +83,14 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
     )  # fmt: skip
 
 
-def wheel_axes(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return the axles (6, 3) of the wheels at waypoint i."""
-    return place_rover(rover, prediction, i).axles
-
-
-def contact_frames(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return the unit vectors n, t, a of each wheel (6, 3, 3) from attitude and contact angle.
+def contact_frames(a: np.ndarray, contact_angle: np.ndarray) -> np.ndarray:
+    """Return the unit vectors n, t, a of each wheel (6, 3, 3) from axles (6, 3) and angles (6,).
 
     n is the contact normal, a the wheel axis, t = a x n.
     """
-    a = wheel_axes(rover, prediction, i)
     ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP), axis=1)[:, None]
     upward = np.cross(ahead, a)
-    angle = prediction.contact_angle[i][:, None]
+    angle = contact_angle[:, None]
     n = np.cos(angle) * upward - np.sin(angle) * ahead
     return np.stack([n, np.cross(a, n), a], axis=1)
 
@@ -106,12 +100,8 @@ def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
 
     Three forces and three moments about the body origin of the whole rover, the moment about each
     bogie pivot (eq 15), and the difference of the moments about the rocker pivots (eq 14 for both
-    sides). Moments are divided by weight and wheelbase.
-
-    Args:
-        rover: The rover.
-        placed: Positions of its parts.
-        acting: All forces: (force [N], position [m], side, whether on the bogie).
+    sides). Moments are divided by weight and wheelbase. Each force that is `acting` is told with
+    its position: (force [N], position [m], side, whether on the bogie).
     """
     axis = placed.attitude[:, 1]
 
@@ -147,7 +137,8 @@ def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.nd
     """Return the residuals of the nine balance equations of waypoint i; see `balance_sums`."""
     placed = place_rover(rover, prediction, i)
     shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
-    forces = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(rover, prediction, i))
+    frames = contact_frames(placed.axles, prediction.contact_angle[i])
+    forces = np.einsum("kw,wkx->wx", np.array(shares), frames)
     acting = _on_wheels(prediction, i, placed, forces) + _weights(rover, placed)
     return balance_sums(rover, placed, acting)
 
@@ -160,7 +151,8 @@ def balance_matrix(
     A @ (N, T, s) = b is its balance, with forces in units of the weight and lateral forces
     S = shares @ s, which are s0 + s1 * position along the body where `shared`, else independent.
     """
-    placed, frames = place_rover(rover, prediction, i), contact_frames(rover, prediction, i)
+    placed = place_rover(rover, prediction, i)
+    frames = contact_frames(placed.axles, prediction.contact_angle[i])
     sums = []
     for kind in range(3):
         for wheel in range(6):
@@ -174,19 +166,19 @@ def balance_matrix(
     return np.hstack([A[:, :12], A[:, 12:] @ shares]), b, shares
 
 
-COARSE_ANGLES, COARSE_ACROSS = 121, 17
+COARSE_ANGLES, COARSE_ACROSS = 241, 33
 """Points along and across a wheel in the first look of `wheel_gaps`."""
-STARTS, REFINEMENTS = 6, 7
+STARTS, REFINEMENTS = 30, 7
 """Nearest points that are refined, and how often the spacing is divided by three."""
 
 
 def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the smallest vertical gap (6,) [m] between each wheel's lower half and the ground.
 
-    The whole width of the wheels of waypoint i is looked at, densely and at all vertices of the
-    ground, then around the nearest points.
+    The whole width of the wheels of waypoint i is looked at, densely, then around the nearest
+    points.
     """
-    wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
+    wheels = zip(prediction.wheel_centres[i], place_rover(rover, prediction, i).axles, strict=True)
     return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
 
 
@@ -209,7 +201,6 @@ def wheel_gap(rover: Rover, terrain: Terrain, centre: np.ndarray, axis: np.ndarr
         np.linspace(-half, half, COARSE_ACROSS),
     )
     places = np.stack([part.ravel() for part in grid])
-    places = np.hstack([places, vertices_below(rover, terrain, centre, (ahead, upward, axis))])
     gaps = gaps_at(*places)
     best = places[:, np.argsort(gaps)[:STARTS]]
     around = np.stack([part.ravel() for part in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 9)])])
@@ -221,24 +212,6 @@ def wheel_gap(rover: Rover, terrain: Terrain, centre: np.ndarray, axis: np.ndarr
         best = near[:, np.arange(STARTS), nearest]
         steps = steps / 3.0
     return float(gaps.min())
-
-
-def vertices_below(
-    rover: Rover, terrain: Terrain, centre: np.ndarray, frame: tuple[np.ndarray, ...]
-) -> np.ndarray:
-    """Return angles and places across (2, k) of a wheel above the vertices of the ground."""
-    ahead, upward, axis = frame
-    left = np.cross(UP, ahead)
-    reach = rover.wheel.radius + 0.5 * rover.wheel.width
-    first = np.floor((centre[:2] - reach - terrain.origin) / terrain.resolution)
-    steps = np.arange(2 + int(2.0 * reach / terrain.resolution))
-    cells = np.stack([part.ravel() for part in np.meshgrid(first[0] + steps, first[1] + steps)])
-    away = terrain.resolution * cells.T + terrain.origin - centre[:2]
-    sine = away @ ahead[:2] / rover.wheel.radius
-    cosine = np.sqrt(np.clip(1.0 - sine**2, 0.0, None))
-    across = (away @ left[:2] + rover.wheel.radius * cosine * (upward @ left)) / (axis @ left)
-    below = (np.abs(sine) < 1.0) & (np.abs(across) <= 0.5 * rover.wheel.width)
-    return np.stack([np.arcsin(sine[below]), across[below]])
 
 
 def turned_round(rover: Rover) -> Rover:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small maps and surveys for tests of surveys."""
 
+import itertools
 import os
 import signal
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rover_physics import SweepOptions, Terrain, save_terrain
-from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk, survey_chunk
+from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, survey_chunk
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import SurveyStore
@@ -49,8 +50,7 @@ def prepare_here(
 def compute_here(prepared: PreparedSurvey) -> PreparedSurvey:
     """Survey the chunks that are left in this process, without a cluster."""
     for chunk in prepared.chunks:
-        layers = compute_chunk(prepared.job.request, prepared.store, chunk)
-        prepared.store.write(chunk, layers, 1.0)
+        survey_chunk(prepared.job, chunk)
     return prepared
 
 
@@ -66,12 +66,6 @@ def layers_of(store: SurveyStore) -> dict[str, np.ndarray]:
     return {name: store.layer(name)[:] for name in store.notes.layers}
 
 
-def count_chunks(out: Path) -> int:
-    """Return the number of finished chunks, while a survey runs."""
-    files = Path(out, "seconds", "c").rglob("*")
-    return sum(path.is_file() and not path.name.endswith("partial") for path in files)
-
-
 def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
     """Assert that layers are the same to the bit."""
     assert one.keys() == other.keys()
@@ -80,15 +74,13 @@ def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -
         assert values.tobytes() == other[name].tobytes(), name
 
 
-_attempts = 0
+_attempts = itertools.count(1)
 
 
 def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
     """Survey a chunk as a task does, but fail on one; here, as workers import it."""
-    global _attempts
     if chunk == (0, 1):
-        _attempts += 1
-        raise RuntimeError(f"this chunk is cursed after {_attempts} attempts")
+        raise RuntimeError(f"this chunk is cursed after {next(_attempts)} attempts")
     return survey_chunk(job, chunk)
 
 

@@ -7,7 +7,7 @@ from rover_physics import PathPrediction, Rover, Terrain, judge_path
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
 from support.reference_drives import drive_path
-from support.rover_geometry import wheel_axes
+from support.rover_geometry import place_rover
 
 
 def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
@@ -19,7 +19,7 @@ def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
         prediction.rocker_angle[i, 0],
         prediction.bogie_angle[i],
         prediction.contact_angle[i],
-        np.sum(arms * wheel_axes(rover, prediction, i), axis=1),
+        np.sum(arms * place_rover(rover, prediction, i).axles, axis=1),
         prediction.steering_angle[i],
     )
 
@@ -46,8 +46,7 @@ def drive_states(rover: Rover, ground: Terrain, path: np.ndarray = STRAIGHT):
     ])  # fmt: skip
     rocker, bogie = rate(prediction.rocker_angle), rate(prediction.bogie_angle)
     speeds = np.linalg.norm(rate(prediction.wheel_centres), axis=2)
-    names = ("rear", "middle", "front")
-    hung = np.array([name != rover.suspension.rocker_wheel for name in names] * 2)
+    hung = place_rover(rover, prediction, 0).on_bogie
     sides = np.repeat([0, 1], 3)
     links = turning[:, [1]] + rocker[:, sides] + bogie[:, sides] * hung
     about_axles = links * np.cos(steering) - turning[:, [0]] * np.sin(steering)

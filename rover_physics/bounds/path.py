@@ -36,6 +36,7 @@ from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
 from rover_physics.prediction.packed_model import PackedModel, forget_models
 from rover_physics.prediction.sweep import check_poses
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import (
     BOUNDED_VALUES,
     WAYPOINT_BOUNDS,
@@ -84,29 +85,18 @@ def check_sigmas(sigmas: float | None) -> float:
     return value
 
 
-def bound_path(
-    model: PackedModel, prediction: PathPrediction, sigmas: float | None
-) -> PathBounds | None:
-    """Bound a prediction along a path over a map with uncertain heights.
+def is_uncertain(terrain: Terrain, sigmas: float | None) -> bool:
+    """Return whether heights of a terrain may be wrong by a number of standard deviations."""
+    return bool(sigmas) and terrain.elevation_std is not None
 
-    Args:
-        model: The model on its terrain, with a layer `elevation_std`.
-        prediction: What the model predicts.
-        sigmas: Number of standard deviations by which each height may be wrong; 0 or None for no
-            bounds.
 
-    Returns:
-        Bounds on each waypoint, which contain the prediction; None if the terrain has no such
-        layer or there are no standard deviations.
+def check_bounds(terrain: Terrain, options: SweepOptions) -> None:
+    """Check that there are bounds on a terrain with uncertain heights.
 
     Raises:
-        ModelError: `sigmas` is negative or not a number, a terrain with too many soils, or policy
-            "servo".
+        ModelError: A terrain with too many soils, or policy "servo".
     """
-    allowed, terrain = check_sigmas(sigmas), model.terrain
-    if terrain.elevation_std is None or allowed == 0.0:
-        return None
-    if model.options.policy == SERVO:
+    if options.policy == SERVO:
         raise ModelError(
             f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
             f"sigmas, or use {EQUAL!r} or {OPTIMAL!r}"
@@ -116,12 +106,33 @@ def bound_path(
             f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
             f"most {MAX_SOILS - 1}"
         )
-    grounds = _pack_grounds(terrain, allowed)
+
+
+def bound_path(model: PackedModel, prediction: PathPrediction, sigmas: float) -> PathBounds | None:
+    """Bound a prediction along a path over a map with uncertain heights.
+
+    Args:
+        model: The model on its terrain, with a layer `elevation_std`.
+        prediction: What the model predicts.
+        sigmas: Number of standard deviations by which each height may be wrong; 0 for no bounds.
+
+    Returns:
+        Bounds on each waypoint, which contain the prediction; None if the terrain has no such
+        layer or there are no standard deviations.
+
+    Raises:
+        ModelError: As `check_bounds`.
+    """
+    terrain = model.terrain
+    if not is_uncertain(terrain, sigmas):
+        return None
+    check_bounds(terrain, model.options)
+    grounds = _pack_grounds(terrain, sigmas)
     found = find_bounds(model, grounds, prediction.poses, prediction.results)
     for name in BOUNDED_VALUES:
         value, (low, high) = getattr(prediction, name), np.moveaxis(found[name], -1, 0)
         low[:], high[:] = np.minimum(low, value), np.maximum(high, value)
-    return PathBounds(allowed, found)
+    return PathBounds(sigmas, found)
 
 
 @lru_cache(maxsize=2)
@@ -137,7 +148,7 @@ def _pack_grounds(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Grou
 
 def prepare_bounds(terrain: Terrain, sigmas: float) -> None:
     """Pack an uncertain terrain for `bound_path`, so that the first bounds on it are fast."""
-    if terrain.elevation_std is not None and sigmas > 0.0:
+    if is_uncertain(terrain, sigmas):
         _pack_grounds(terrain, sigmas)
 
 

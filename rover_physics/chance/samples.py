@@ -147,8 +147,9 @@ def worst_of(groups: tuple[PlacedSamples, ...]) -> tuple[PlacedSamples, PlacedSa
     samples = [one.add_error(1.0) for group in groups for one in group.samples]
     friction = np.full(6, min(float(one.friction.min()) for one in samples))
     torque = min(one.torque * float(one.torques.min()) for one in samples)
-    mass, com = max(one.mass for one in samples), np.max([one.com for one in samples], 0)
-    shift = np.max([group.shift for group in groups], 0)
+    mass = max(one.mass for one in samples)
+    com = np.array([one.com for one in samples]).max(axis=0)
+    shift = np.array([group.shift for group in groups]).max(axis=0)
     one, other = (
         PlacedSamples(
             (Sample(friction, torque, np.ones(6), side * mass, side * com),), side * shift, 0

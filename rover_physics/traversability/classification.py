@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.bounds.path import SIGMAS
+from rover_physics.bounds.path import SIGMAS, is_uncertain
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.names import CONTROL_POLICIES, EQUAL, TORQUE_POLICIES, WHEELS
 from rover_physics.numerics.interruption import check_interruption
@@ -114,8 +114,8 @@ def classify_judged(
     """
     judged = {prediction.policy: (prediction, verdict)}
     decided: list[list[ClassifiedWaypoint]] = []
-    is_uncertain = sigmas and terrain.elevation_std is not None
-    for policy in CONTROL_POLICIES if is_uncertain else TORQUE_POLICIES:
+    policies = CONTROL_POLICIES if is_uncertain(terrain, sigmas) else TORQUE_POLICIES
+    for policy in policies:
         if policy not in judged:
             asked, poses = replace(options, policy=policy), prediction.poses
             if curvature is None:

@@ -143,7 +143,7 @@ def judge_paths(
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
     """
-    check_sigmas(sigmas)
+    allowed = check_sigmas(sigmas)
     check_accepted_chance(accepted_chance)
     model = pack_model(rover, terrain, options).remember(known)
     checked = [check_poses(poses) for poses in paths]
@@ -155,7 +155,7 @@ def judge_paths(
         if check_entrapment and verdict.code != "wheel_drop":
             course = course_of(model, poses, swept.prediction, swept)
             verdict = refuse_if_trapped(model, course, verdict)
-        prediction, verdict = add_bounds(model, swept.prediction, verdict, sigmas)
+        prediction, verdict = add_bounds(model, swept.prediction, verdict, allowed)
         if accepted_chance is not None and (verdict.traversable or of_refused):
             enough = accepted_chance if stop_at_failure else 1.0
             chance = find_failure_chance(model, swept, enough=enough)
@@ -197,11 +197,11 @@ def judge_poses(
         PoseError: Poses or curvatures of wrong shape, or not numbers.
         ModelError, SoilError: As `judge_path`.
     """
-    check_sigmas(sigmas)
+    allowed = check_sigmas(sigmas)
     check_accepted_chance(accepted_chance)
     model, places = pack_model(rover, terrain, options), check_poses(poses)
     motions = motions_of(model, places, np.zeros(len(places)) if curvature is None else curvature)
-    prediction, verdict = _judge_in_motion(model, places, motions, sigmas)
+    prediction, verdict = _judge_in_motion(model, places, motions, allowed)
     if accepted_chance is not None:
         swept = SweptPath(prediction, NO_CROSSINGS)
         chance = find_failure_chance(model, swept, on_path=False)
@@ -210,7 +210,7 @@ def judge_poses(
 
 
 def _judge_in_motion(
-    model: PackedModel, places: np.ndarray, motions: np.ndarray, sigmas: float | None
+    model: PackedModel, places: np.ndarray, motions: np.ndarray, sigmas: float
 ) -> tuple[PathPrediction, Verdict]:
     """Judge single poses (n, 3) with motions (n, 3) as of `motions_of`."""
     prediction = predict_poses(model, places, motions)
@@ -218,7 +218,7 @@ def _judge_in_motion(
 
 
 def add_bounds(
-    model: PackedModel, prediction: PathPrediction, verdict: Verdict, sigmas: float | None
+    model: PackedModel, prediction: PathPrediction, verdict: Verdict, sigmas: float
 ) -> tuple[PathPrediction, Verdict]:
     """Return a prediction with its bounds and the verdict with their refusals.
 
@@ -276,8 +276,8 @@ class PartwiseJudge:
 
         With a `curvature` (n,), as for `judge_poses`, the poses form no path.
         """
-        check_sigmas(sigmas)
-        self._model, self._sigmas = pack_model(rover, terrain, options), sigmas
+        self._sigmas = check_sigmas(sigmas)
+        self._model = pack_model(rover, terrain, options)
         self._poses = check_poses(poses)
         self._bends = None if curvature is None else check_curvature(curvature, len(self._poses))
         self._courses: list[tuple[np.ndarray, ...]] = []

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.bounds.path import SIGMAS
+from rover_physics.bounds.path import SIGMAS, is_uncertain
 from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import exact_kernel
@@ -93,7 +93,7 @@ def judge_pieces(
     model = pack_model(rover, terrain, options).remember(known)
     sweep = _Sweep(model, list(map(check_poses, pieces)))
     found = {k: PieceVerdict(code) for k, code in sweep.find_failures().items()}
-    if terrain.elevation_std is None or not sigmas:
+    if not is_uncertain(terrain, sigmas):
         found |= sweep.look_between()
     rest = [k for k in range(len(pieces)) if k not in found]
     judged = judge_paths(

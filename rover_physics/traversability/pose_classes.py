@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.bounds.path import SIGMAS
+from rover_physics.bounds.path import SIGMAS, is_uncertain
 from rover_physics.limits import table
 from rover_physics.names import CONTROL_POLICIES, TORQUE_POLICIES
 from rover_physics.numerics.arrays import view_read_only
@@ -33,12 +33,14 @@ from rover_physics.results.uses import RoverLimits, find_broken
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability import classification
+from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_physics.traversability.entrapment import UNKNOWN_CODES
 from rover_physics.traversability.judge import judge_poses
 
-UNKNOWN, PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IMPASSABLE = -1, 0, 1, 2, 3
-"""Classes: off the known map, the index in TORQUE_POLICIES of the first policy that passes, or
-none; the names of those from 0 on are TRAVERSABILITY_CLASSES."""
+UNKNOWN, IMPASSABLE = -1, TRAVERSABILITY_CLASSES.index(classification.IMPASSABLE)
+"""Classes as numbers: off the known map, or no policy passes; else the index of the first that
+passes in TORQUE_POLICIES. Those from 0 on are indices in TRAVERSABILITY_CLASSES, too."""
 PART = 256
 """Number of poses that a thread takes at a time, some 3 ms of work on most ground; before each
 part an interruption is possible."""
@@ -60,7 +62,7 @@ class RoverOnMap:
     @property
     def is_uncertain(self) -> bool:
         """True if the map has deviations of its heights that are allowed for."""
-        return bool(self.sigmas) and self.terrain.elevation_std is not None
+        return is_uncertain(self.terrain, self.sigmas)
 
 
 def hopeless_codes(is_uncertain: bool) -> tuple[str, ...]:

@@ -241,8 +241,8 @@ def refuse_worst_case(
         if not codes[i] and status in _UNBOUNDED:
             codes[i], what = _UNBOUNDED[status]
             reasons[i] = f"{what} {within}"
-    rolling_off_edge = np.asarray(prediction.falling.any(axis=1))
-    needed = bounds.bounded & ~rolling_off_edge
+    falls = np.asarray(prediction.falling.any(axis=1))
+    needed = bounds.bounded & ~falls
     for name in BOUNDED_VALUES:
         # Where the value itself is not known, as the clearance over unknown ground, no bound is.
         missing = np.isnan(getattr(bounds, name)).any(axis=-1) & ~np.isnan(
@@ -333,12 +333,12 @@ def worst_of(verdict: Verdict, other: Verdict) -> Verdict:
 
 def _find_extremes(prediction: PathPrediction) -> dict[str, float]:
     """Return the EXTREMES of a prediction; NaN where no row has the quantity."""
-    rolling_off_edge = prediction.falling.any(axis=1)
+    falls = prediction.falling.any(axis=1)
     found = {}
     for name, (quantity, worse) in EXTREMES.items():
         values = getattr(prediction, quantity)
-        if quantity in EXEMPT_ON_EDGE and rolling_off_edge.any():
-            values = values[~rolling_off_edge]
+        if quantity in EXEMPT_ON_EDGE and falls.any():
+            values = values[~falls]
         found[name] = float(worse.reduce(values, axis=None)) if values.size else np.nan
     return found
 

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.bounds.path import SIGMAS
 from rover_physics.limits.table import CHANCE, Sense
 from rover_physics.names import SERVO, WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import check_poses, predict_paths
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import RoverLimits, find_uses, limits_of
 from rover_physics.rover.model import Rover
@@ -23,64 +22,51 @@ from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.budget import QuestionStoppedError
-from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
-from rover_planner.planning.path_query import Candidate, PathQueryOptions
+from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
-from rover_planner.planning.search.unobserved_check import NONE_REFUSED, UnobservedCheck
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
 EDGE = 2.0
 """Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
-SPACING = 0.2
-"""Distance between waypoints of a path that advice makes anew [wheel radii]."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
 """Settings of the search of a path around."""
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A path, and rover, ground and options for which it is judged."""
+    """A path, and for what it is judged."""
 
-    rover: Rover
-    """The rover."""
-    terrain: Terrain
-    """The ground, map frame."""
+    site: Site
+    """Rover, ground and options, also those of a path that is made anew."""
     poses: Floats
     """(n, 3) x, y [m] and yaw [rad] of the body origin, map frame."""
-    options: SweepOptions = DEFAULT_OPTIONS
-    """Torque policy, friction, torque, soil, arm and direction."""
-    sigmas: float = SIGMAS
-    """Standard deviations by which the map's heights may be wrong."""
-    accepted_chance: float = ACCEPTED_CHANCE
-    """Largest chance of failure of a path that passes."""
-    unobserved_check: UnobservedCheck = NONE_REFUSED
-    """Refuses ground under the belly that was never seen."""
-    marked: MarkedPlaces = NONE_MARKED
-    """Places that are impassable."""
 
     @property
-    def spacing(self) -> float:
-        """Distance between waypoints of a path that is made anew [m]."""
-        return SPACING * self.rover.wheel.radius
+    def rover(self) -> Rover:
+        """The rover."""
+        return self.site.rover
 
     @property
-    def site(self) -> Site:
-        """The rover on the ground, with the options of a path that is made anew."""
-        options = PathQueryOptions(
-            waypoint_spacing=self.spacing,
-            model=self.options,
-            map_sigmas=self.sigmas,
-            accepted_chance=self.accepted_chance,
-        )
-        return Site(self.rover, self.terrain, options, self.unobserved_check, self.marked)
+    def terrain(self) -> Terrain:
+        """The ground, map frame."""
+        return self.site.terrain
+
+    @property
+    def options(self) -> SweepOptions:
+        """Options of the model."""
+        return self.site.options.model
 
     def change(self, **options: Any) -> "Case":
         """Return the case with other options."""
-        return replace(self, options=replace(self.options, **options))
+        return self.change_site(options=self.site.options.change(**options))
+
+    def change_site(self, **changes: Any) -> "Case":
+        """Return the case with another rover, ground or options."""
+        return replace(self, site=replace(self.site, **changes))
 
     def judge(self) -> "JudgedCase":
         """Judge the path up to its first failure; of one that passes, all is predicted.
@@ -93,11 +79,11 @@ class Case:
             self.terrain,
             self.poses,
             self.options,
-            sigmas=self.sigmas,
+            sigmas=self.site.options.map_sigmas,
             stop_at_failure=True,
-            accepted_chance=self.accepted_chance,
+            accepted_chance=self.site.options.accepted_chance,  # 1, too: the chance is told
         )
-        path = self.site.hold(Candidate(self.poses, *judged))
+        path = self.site.refuse_ground(Candidate(self.poses, *judged))
         return JudgedCase(self, path.prediction, path.verdict)
 
     def predict(self) -> PathPrediction:
@@ -111,35 +97,29 @@ class Case:
         Its first row has another motion than in the path, and wheels behind the place may fall in
         ways that the piece does not show.
         """
+        accepted = self.site.options.accepted_chance
         (_, verdict), *_ = judge_paths(
             self.rover,
             self.terrain,
             [self.poses[rows]],
             self.options,
-            sigmas=self.sigmas,
+            sigmas=self.site.options.map_sigmas,
             stop_at_failure=True,
             check_entrapment=False,
-            accepted_chance=self.accepted_chance if by_chance else None,
+            accepted_chance=accepted if by_chance else None,
         )
         row = verdict.first_failure
-        if verdict.code == CHANCE and verdict.failure_chance_at[row] <= self.accepted_chance:
+        if verdict.code == CHANCE and verdict.failure_chance_at[row] <= accepted:
             return False
         return (0 if rows.start == 0 else 1) <= row <= place - rows.start
 
 
 def case_of(site: Site, poses: Floats) -> Case:
-    """Return the case of a path that was judged."""
-    options = site.options
-    return Case(
-        site.rover,
-        site.terrain,
-        poses,
-        options.model,
-        options.map_sigmas,
-        min(options.accepted_chance, ACCEPTED_CHANCE),
-        site.unobserved_check,
-        site.marked,
-    )
+    """Return the case of a path that was judged; what is advised has an accepted chance."""
+    asked = site.options.asked_chance
+    accepted = ACCEPTED_CHANCE if asked is None else asked
+    options = site.options.change(accepted_chance=accepted, waypoint_spacing=0.0)
+    return Case(replace(site, options=options), poses)
 
 
 @dataclass(frozen=True, eq=False)

@@ -154,8 +154,8 @@ def _tip_move(refusal: JudgedCase, k: int, angle: float) -> str:
 
 
 def _payload(refusal: JudgedCase) -> Span | None:
-    arm, told = refusal.case.rover.manipulator, refusal.case.options.payload
-    now = told if told is not None else arm.payload if arm is not None else 0.0
+    arm = refusal.case.site.assumed_rover.manipulator
+    now = 0.0 if arm is None else arm.payload
     return Span(now, (0.0,)) if now > 0.0 else None
 
 
@@ -217,7 +217,7 @@ def _spacing(case: Case) -> float:
     """Return the distance of waypoints [m] of a path of its own, where it does not turn."""
     steps = np.diff(distance_along(case.poses))
     driven = steps[steps > 0.0]
-    return float(np.median(driven)) if len(driven) else case.spacing
+    return float(np.median(driven)) if len(driven) else case.site.options.waypoint_spacing
 
 
 def _with_path(change: Callable[[Case, JudgedCase, float], Any]) -> Callable[..., Case | None]:
@@ -242,14 +242,12 @@ def _friction(refusal: JudgedCase) -> Span | None:
     case = refusal.case
     if case.terrain.friction is not None or case.terrain.soil is not None or case.options.soil:
         return None  # the ground has its own
-    told = case.options.friction
-    now = case.rover.friction if told is None else told
+    now = case.site.assumed_rover.friction
     return Span(now, (MOST_FRICTION,)) if now < MOST_FRICTION else None
 
 
 def _torque(refusal: JudgedCase) -> Span:
-    told = refusal.case.options.max_torque
-    now = refusal.case.rover.wheel.max_torque if told is None else told
+    now = refusal.case.site.assumed_rover.wheel.max_torque
     return Span(now, (MOST_TORQUE * now,))
 
 
@@ -273,7 +271,7 @@ def _disc(case: Case, refusal: JudgedCase) -> Any:
 def _lower_rock(case: Case, refusal: JudgedCase, depth: float) -> Case:
     disc, heights = _disc(case, refusal), case.terrain.elevation.copy()
     heights[disc] = np.minimum(heights[disc], np.nanmax(heights[disc]) - depth)
-    return replace(case, terrain=replace(case.terrain, elevation=heights))
+    return case.change_site(terrain=replace(case.terrain, elevation=heights))
 
 
 def _describe_rock(refusal: JudgedCase, depth: float, _now: float) -> str:
@@ -293,7 +291,7 @@ def _limit(row: Limit) -> Lever:
     def apply(case: Case, _refusal: JudgedCase, bound: float) -> Case:
         changed: dict[str, Any] = {row.reads: bound}
         limits = replace(case.rover.limits, **changed)
-        return replace(case, rover=replace(case.rover, limits=limits))
+        return case.change_site(rover=replace(case.rover, limits=limits))
 
     def words(_refusal: JudgedCase, bound: float, now: float) -> str:
         name = row.reads.replace("_", " ")

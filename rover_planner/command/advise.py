@@ -45,10 +45,12 @@ def advise(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.advice.advise import STOPPED, grow_within, path_of, refuse
-    from rover_planner.advice.case import SPACING, Case
+    from rover_planner.advice.case import Case
     from rover_planner.command.prediction_files import read_poses
     from rover_planner.nodes.warm_up import search_paths
     from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
+    from rover_planner.planning.path_query import PathQueryOptions, waypoint_spacing_for
+    from rover_planner.planning.search.site import Site
     from rover_planner.shell.progress import show_progress
 
     if picture is not None:
@@ -56,16 +58,20 @@ def advise(
 
         check_picture(picture)
     model = load_rover(rover)
-    options = SweepOptions(
-        policy=policy,
-        friction=friction,
-        max_torque=max_torque,
-        soil=soil,
-        joint_angles=read_arm_angles(model, arm or ()),
-        payload=payload,
+    options = PathQueryOptions(
+        model=SweepOptions(
+            policy=policy,
+            friction=friction,
+            max_torque=max_torque,
+            soil=soil,
+            joint_angles=read_arm_angles(model, arm or ()),
+            payload=payload,
+        ),
+        map_sigmas=sigmas,
+        accepted_chance=accepted_chance,
     )
-    path = path_of(model, read_poses(poses), SPACING * model.wheel.radius)
-    case = Case(model, load_terrain(terrain, max_cells), path, options, sigmas, accepted_chance)
+    path = path_of(model, read_poses(poses), waypoint_spacing_for(model))
+    case = Case(Site(model, load_terrain(terrain, max_cells), options), path)
     advice = None
     try:
         with show_progress() as progress:

@@ -159,8 +159,8 @@ def _check_on_map(ground: "Terrain", **ends: Pose | None) -> None:
             continue
         x_low, x_high, y_low, y_high = ground.bounds
         raise PlanningError(
-            f"{name} is ({pose[0]:g}, {pose[1]:g}) m; it must be on the map, x {x_low:g} to "
-            f"{x_high:g} and y {y_low:g} to {y_high:g} m"
+            f"{name} is ({pose[0]:.10g}, {pose[1]:.10g}) m; it must be on the map, "
+            f"x {x_low:.10g} to {x_high:.10g} and y {y_low:.10g} to {y_high:.10g} m"
         )
 
 

@@ -312,16 +312,17 @@ def _draw(
 
 def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> "PathAnswer":
     """Return the best candidate path, or if all are refused the one that a search finds."""
-    from rover_planner.planning.path_query import PathQueryOptions, add_path, answer_path_query
+    from rover_planner.planning.path_query import add_path
+    from rover_planner.planning.search.judge import PathJudge
     from rover_planner.planning.search.path_search import find_path
     from rover_planner.planning.search.query import SearchQuery
     from rover_planner.planning.search.site import Site
 
-    options = PathQueryOptions()
-    answer = answer_path_query(rover, ground, start, goal, options)
+    site = Site(rover, ground)
+    answer = PathJudge(site).search(start, goal)
     if answer.traversable or not ground.contains(*goal[:2]):
         return answer
-    found = find_path(SearchQuery(Site(rover, ground, options), start, goal))
+    found = find_path(SearchQuery(site, start, goal))
     return answer if found.path is None else add_path(answer, found.path, np.array(goal))
 
 

@@ -180,7 +180,7 @@ def _sight(ground: _Ground, clear: NDArray[np.bool_], places, bearings) -> NDArr
     px = places[:, 0, None, None] + distances * np.cos(bearings)[:, None]
     py = places[:, 1, None, None] + distances * np.sin(bearings)[:, None]
     row, column, inside = ground.cells(px, py)
-    return step * np.cumprod(inside & clear[row, column], axis=2).sum(axis=2)
+    return np.asarray(step * np.cumprod(inside & clear[row, column], axis=2).sum(axis=2), float)
 
 
 def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:

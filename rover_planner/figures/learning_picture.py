@@ -41,7 +41,7 @@ def draw_learning(
         image = axes.imshow(
             friction, origin="lower", extent=extent, vmin=0.0, vmax=1.2, cmap="cividis", alpha=0.8
         )
-        figure.colorbar(image, ax=axes, label="friction, mean")
+        figure.colorbar(image, ax=axes, label="friction")
         axes.plot(*places.T, color=INK, linewidth=1.0)
         margin = 0.8
         low, high = places.min(axis=0) - margin, places.max(axis=0) + margin

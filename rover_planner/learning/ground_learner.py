@@ -186,7 +186,7 @@ class GroundLearner:
         self._resistance, self._resistance_square, self._steady = 0.0, 0.0, 0.0
         self._slip_time: float | None = None
         self._immobilised_time: float | None = None
-        self.ground = GroundMap(terrain, wheel.width)
+        self.ground = GroundMap(terrain, wheel.width, told)
         """The estimates where the wheels have been."""
         self.window: SlipWindow | None = None
         """The last window; None before the first."""
@@ -201,7 +201,7 @@ class GroundLearner:
     def change_map(self, terrain: Terrain) -> None:
         """Go on with another map of the same ground."""
         self._sense = ContactSense(self._rover, terrain)
-        self.ground = GroundMap(terrain, self._rover.wheel.width)
+        self.ground = GroundMap(terrain, self._rover.wheel.width, self._told)
 
     def take(self, row: Floats) -> bool:
         """Take a row of measurements; return whether the estimate is new."""

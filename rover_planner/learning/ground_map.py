@@ -14,13 +14,14 @@ from rover_planner.learning.friction_filter import FrictionEstimate
 class GroundMap:
     """Writes what is learned below the wheels into layers of a terrain."""
 
-    def __init__(self, terrain: Terrain, width: float):
-        """Start with ground that no wheel of a width [m] has touched."""
-        self._classes = terrain.ground_class
+    def __init__(self, terrain: Terrain, width: float, told: float):
+        """Start with ground that no wheel of a width [m] has touched, and its told friction."""
+        self._classes, self._told = terrain.ground_class, told
         self._origin, self._resolution = np.array(terrain.origin), terrain.resolution
         self.visited = np.full((2, *terrain.elevation.shape), np.nan)
         """(2, ny, nx) mean and standard deviation of the friction where wheels have been, NaN
-        elsewhere; the last visit counts."""
+        elsewhere; the last visit counts. What nothing bounds is at most what was told or proved.
+        """
         reach = max(round(0.5 * width / terrain.resolution), 0)
         steps = np.arange(-reach, reach + 1)
         self._around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -31,7 +32,10 @@ class GroundMap:
         rows, columns = self.visited.shape[1:]
         inside = ((cells >= 0) & (cells < [columns, rows])).all(axis=1)
         columns, rows = cells[inside].T
-        self.visited[:, rows, columns] = [[estimate.mean], [estimate.std]]
+        friction = estimate.mean
+        if estimate.high is None:
+            friction = min(friction, max(self._told, estimate.low))
+        self.visited[:, rows, columns] = [[friction], [estimate.std]]
 
     def classes_at(self, places: Floats) -> Floats:
         """Return the classes (n,) of the ground at places (n, 2) [m] on the map; NaN for none."""

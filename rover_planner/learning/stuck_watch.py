@@ -61,7 +61,8 @@ class StuckWatch:
         wanted = bool((np.abs(torques) >= self._most).sum() >= WHEEL_COUNT // 3)
         if commanded is not None:
             wanted = abs(commanded) > self._slowest
-        wanted = wanted and window.scrub.max() < self._slowest  # else it stands while it steers
+        holds_steering = bool(window.scrub.max() < self._slowest)
+        wanted = wanted and holds_steering  # while it steers, it stands
         past = self._past
         if past and not 0.0 <= window.time - past[-1][0] <= LONGEST_GAP:
             past.clear()

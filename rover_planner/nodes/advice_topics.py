@@ -88,15 +88,15 @@ class AdviceTopics:
         refused, check = request.refused, request.budget.check
         if refused is None:
             return refusal("no_path", NOTHING_REFUSED)
-        judge, candidate, told = refused.judge, refused.candidate, None
-        assert judge is not None and candidate is not None
-        case = case_of(judge.site, candidate.poses)
+        site, candidate, last = refused.site, refused.candidate, None
+        assert site is not None and candidate is not None
+        case = case_of(site, candidate.poses)
         for advice in grow_within(case, lambda: self._desk.give_way(check)):
-            if told is None or len(advice.found) > len(told.found):
+            if last is None or len(advice.found) > len(last.found):
                 self._node.handover.call(partial(self._publish, advice))
-            told = advice
-        assert told is not None
-        return told
+            last = advice
+        assert last is not None
+        return last
 
     def _publish(self, advice: Advice) -> None:
         self._growing.publish(String(data=to_json(advice.to_dict())))

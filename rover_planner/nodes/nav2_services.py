@@ -87,9 +87,9 @@ class Nav2Services:
         response.is_valid = judged.traversable
         response.invalid_pose_indices = list(range(len(request.path.poses)))
         if judged.candidate is not None:
-            assert judged.judge is not None
+            assert judged.site is not None
             assert isinstance(given, GivenPath) and given.poses is not None
-            spacing = judged.judge.site.options.waypoint_spacing
+            spacing = judged.site.options.waypoint_spacing
             response.invalid_pose_indices = find_invalid_poses(
                 judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
             )
@@ -131,11 +131,11 @@ def _name_error(judged: PathJudgement) -> str:
     if judged.traversable:
         return ERRORS[""]
     name, chosen = ERRORS.get(judged.code, NO_PATH), judged.candidate
-    if name != "GOAL_OUTSIDE_MAP" or chosen is None or judged.judge is None:
+    if name != "GOAL_OUTSIDE_MAP" or chosen is None or judged.site is None:
         return name
     if chosen.verdict.first_failure == 0:
         return "START_OUTSIDE_MAP"
-    return NO_PATH if judged.judge.site.terrain.contains(*chosen.poses[-1, :2]) else name
+    return NO_PATH if judged.site.terrain.contains(*chosen.poses[-1, :2]) else name
 
 
 def find_invalid_poses(codes: Sequence[str], given: NDArray[np.intp]) -> list[int]:

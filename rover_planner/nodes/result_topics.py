@@ -59,8 +59,8 @@ class ResultTopics:
             judgement: The answer.
             identity: What it is about; without a path, that of the plan is added.
         """
-        values, judge = self._node.values, judgement.judge
-        rover = self._inputs.service.settings.rover if judge is None else judge.site.rover
+        values, site = self._node.values, judgement.site
+        rover = self._inputs.service.settings.rover if site is None else site.rover
         header = Header(frame_id=values.map_frame, stamp=ns_to_stamp(self._next_stamp()))
         results = ResultMessages(judgement, identity, header, rover, values, self._inputs)
         if judgement.traversable and not identity.path_hash:

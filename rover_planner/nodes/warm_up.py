@@ -12,7 +12,6 @@ from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.learning.drive_log import FORCES, TIME, WIDTH
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.difficulty import estimate_difficulty
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.graph import Seeds, ShortestPaths
@@ -39,7 +38,7 @@ def search_paths() -> None:
         elevation = np.zeros((60, 60))
         elevation[:rows, 30] = 1.0
         ground = Terrain(elevation, 0.05, (0.0, 0.0))
-        site = Site(load_rover("lsr1"), ground, PathQueryOptions())
+        site = Site(load_rover("lsr1"), ground)
         find_path(SearchQuery(site, *ends), LatticeSettings(budget=60.0, cell=0.4))
 
 

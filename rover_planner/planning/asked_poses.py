@@ -39,7 +39,7 @@ def merge_poses(prediction: PathPrediction) -> AskedPoses:
     order = np.argsort(place, kind="stable")
     along = place[order]
     driven = {
-        name: np.interp(along, np.arange(n), _hold_known(getattr(prediction, name)))
+        name: np.interp(along, np.arange(n), _fill_unknown(getattr(prediction, name)))
         for name in ("distance", "time", "energy")
     }
     merged = replace(
@@ -54,7 +54,7 @@ def merge_poses(prediction: PathPrediction) -> AskedPoses:
     return AskedPoses(known, order >= n, along, driven["distance"], driven["time"])
 
 
-def _hold_known(values: Floats) -> Floats:
+def _fill_unknown(values: Floats) -> Floats:
     """Return values (n,), ascending, with the last known one, or 0, in place of each NaN."""
     return np.maximum.accumulate(np.where(np.isnan(values), 0.0, values))
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.errors import PlanningError
-from rover_planner.planning.path_query import Candidate
 
 MARKED_CODE = "marked_place"
 """Code of the refusal."""
@@ -80,13 +79,6 @@ class MarkedPlaces:
         for place in self.places:
             refused |= place.is_entered(place.away(start[None, :]), place.away(ends))
         return refused
-
-    def hold(self, candidate: Candidate) -> Candidate:
-        """Return a path, refused where it enters a place."""
-        found = self.find(candidate.poses) if candidate.verdict.traversable else None
-        if found is None:
-            return candidate
-        return candidate.refuse_at(found[0], MARKED_CODE, found[1].describe())
 
     def find(self, poses: NDArray[np.float64]) -> tuple[int, MarkedPlace] | None:
         """Return the first pose that comes nearer to a centre within a disc, and its place."""

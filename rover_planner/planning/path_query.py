@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges candidate paths between two poses, compares risk and energy, and explains the choice."""
+"""Candidate paths between two poses: their options, risk and energy, and the choice explained."""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,15 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.limits.table import CHANCE
-from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict, with_refusals
 from rover_planner.planning.candidates import generate_candidates, path_length
 
@@ -56,8 +52,13 @@ class PathQueryOptions:
     accepted_chance: float = ACCEPTED_CHANCE
     """Largest chance of failure of a path that is traversable; 1 does not ask for it."""
 
+    @property
+    def asked_chance(self) -> float | None:
+        """The accepted chance as the model takes it: None does not ask for it."""
+        return self.accepted_chance if self.accepted_chance < 1.0 else None
+
     def fit(self, rover: Rover) -> "PathQueryOptions":
-        """Return the options with the lengths of a rover where none are told."""
+        """Return the options with the lengths of a rover where none are given."""
         usual = waypoint_spacing_for(rover)
         return replace(
             self,
@@ -187,64 +188,16 @@ def add_path(answer: PathAnswer | None, path: Candidate, goal: Pose) -> PathAnsw
     return PathAnswer(candidates, len(candidates) - 1, path.poses[-1], offset, tried)
 
 
-def answer_path_query(
-    rover: Rover, terrain: Terrain, start, goal, options: PathQueryOptions | None = None
-) -> PathAnswer:
-    """Evaluate the candidate paths from start to goal and choose the best traversable one.
-
-    Of several candidates, or with a goal off the map, a refused one is judged up to its first
-    failure; `check_path` judges all of it, as is done for a single candidate.
-
-    Args:
-        rover: The rover; its steering sets the smallest radius of a candidate.
-        terrain: The ground, map frame.
-        start: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
-        goal: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
-        options: How candidates are generated and judged; None takes the defaults.
-
-    Raises:
-        PlanningError: Start, goal or options are invalid.
-        RoverError: The model refuses an option (ModelError) or the poses (PoseError).
-    """
-    options = options or PathQueryOptions()
-    paths = generate_paths(rover, start, goal, options)
-    if len(paths) == 1 and terrain.contains(*paths[0][-1, :2]):
-        return choose((check_path(rover, terrain, paths[0], options),))
-    judged = judge_paths(
-        rover, terrain, paths, options.model, sigmas=options.map_sigmas, stop_at_failure=True
-    )
-    candidates = [Candidate(poses, *one) for poses, one in zip(paths, judged, strict=True)]
-    return choose_by_chance(rover, terrain, candidates, options)
-
-
-def choose_by_chance(
-    rover: Rover, terrain: Terrain, candidates: list[Candidate], options: PathQueryOptions
-) -> PathAnswer:
-    """Choose the traversable candidate with the lowest cost whose chance of failure is accepted.
-
-    Chances are found in the order of the costs, up to the first that is accepted.
-    """
-    while (answer := choose(tuple(candidates))).traversable:
-        best = answer.choice
-        if options.accepted_chance >= 1.0 or candidates[best].verdict.failure_chance_at:
-            return answer
-        candidates[best] = check_path(
-            rover, terrain, candidates[best].poses, options, stop_at_failure=True
-        )
-    if answer.chosen.verdict.code == CHANCE:
-        candidates[answer.choice] = check_path(rover, terrain, answer.chosen.poses, options)
-    return choose(tuple(candidates))
-
-
 def generate_paths(
     rover: Rover, start, goal, options: PathQueryOptions
 ) -> list[NDArray[np.float64]]:
-    """Return the poses (n, 3) of the candidate paths of `answer_path_query`, the direct one first.
+    """Return the poses (n, 3) of the candidate paths, the direct one first.
+
+    The options must have their lengths, see `PathQueryOptions.fit`.
 
     Raises:
         PlanningError: Start, goal or options are invalid.
     """
-    options = options.fit(rover)
     return generate_candidates(
         start,
         goal,
@@ -254,42 +207,6 @@ def generate_paths(
         min_radius=tightest_radius(rover),
         swing_radius=swing_radius(rover) if can_turn_on_the_spot(rover) else None,
     )
-
-
-def check_path(
-    rover: Rover,
-    terrain: Terrain,
-    poses: NDArray[np.float64],
-    options: PathQueryOptions | None = None,
-    *,
-    stop_at_failure: bool = False,
-    known: KnownPoses | None = None,
-) -> Candidate:
-    """Evaluate and judge a given path of poses (n, 3); `known` is as for `judge_path`.
-
-    Other arguments are as for `answer_path_query`.
-
-    With `stop_at_failure`, the waypoints beyond the first failure are left out, and a chance of
-    failure above the accepted one may be larger than told. It is asked only of a path that is
-    traversable without it.
-
-    Raises:
-        RoverError: The model refuses an option (ModelError) or the poses (PoseError).
-    """
-    options = options or PathQueryOptions()
-    poses = np.array(poses, np.float64)
-    judged = judge_path(
-        rover,
-        terrain,
-        poses,
-        options.model,
-        sigmas=options.map_sigmas,
-        stop_at_failure=stop_at_failure,
-        accepted_chance=options.accepted_chance if options.accepted_chance < 1.0 else None,
-        chance_of_refused=False,
-        known=known,
-    )
-    return Candidate(poses, *judged)
 
 
 def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:

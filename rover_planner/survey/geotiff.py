@@ -123,6 +123,8 @@ class GeoTiffMap:
         values = file.read(1, window=window, masked=True)
         unknown = np.ma.getmaskarray(values)
         with np.errstate(invalid="ignore"):  # of signalling NaNs
+            if file.nodata is not None:  # GDAL forgets it where there is a mask, too
+                unknown = unknown | (values.data == file.nodata)
             heights = np.where(unknown, np.nan, values.data.astype(np.float64))
         if file.nodata is None:
             self._check_declared(heights)

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.traversability.classification import IMPASSABLE, TRAVERSABILITY_CLASSES
+from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
+from rover_physics.traversability.pose_classes import IMPASSABLE
 from rover_physics.traversability.verdict import codes_of_verdicts
 from rover_planner.survey.layout import Index
 
@@ -14,9 +15,7 @@ NOT_SURVEYED = 255
 """Class and limit of a cell that is not surveyed yet, or whose chunk failed."""
 NO_LIMIT = 0
 """Value of `first_limit` where no limit fails; 1 + k stands for code k of verdicts."""
-CLASS_NUMBERS = {name: number for number, name in enumerate(TRAVERSABILITY_CLASSES)}
-"""Classes as kept, from best to worst."""
-SOME_HEADINGS = len(CLASS_NUMBERS)
+SOME_HEADINGS = len(TRAVERSABILITY_CLASSES)
 """Drawn as a class of its own: impassable at some headings, not at others."""
 CLASS_LABELS = (*TRAVERSABILITY_CLASSES, "passable at some headings")
 """Names of the drawn classes, by number."""
@@ -58,11 +57,11 @@ def read_drawn_classes(store: Any) -> NDArray:
         np.asarray(store.layer(name)[::every, ::every])
         for name in ("worst_class", "best_class", "first_limit")
     )
-    impassable, limits = CLASS_NUMBERS[IMPASSABLE], number_limits()
+    limits = number_limits()
     shown = worst.copy()
-    shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
+    shown[(worst == IMPASSABLE) & (best < IMPASSABLE)] = SOME_HEADINGS
     off_ground = [limits[code] for code in ("off_map", "unknown_ground")]
-    shown[(best == impassable) & np.isin(first, off_ground)] = NOT_SURVEYED
+    shown[(best == IMPASSABLE) & np.isin(first, off_ground)] = NOT_SURVEYED
     return shown
 
 

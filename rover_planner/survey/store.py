@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from rover_physics.files.user_file import writing
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
 from rover_planner.survey.geotiff import GeoTiffMap
-from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED, list_layers, number_limits
+from rover_planner.survey.layers import NOT_SURVEYED, list_layers, number_limits
 from rover_planner.survey.layout import Index, SurveyLayout
 from rover_planner.survey.map_source import MAP, MapFrame, StoredMap, keep_map
 
@@ -78,7 +79,7 @@ class StoreNotes:
             "origin": list(frame.origin),
             "crs": frame.crs,
             "map_file": self.map_file,
-            "classes": {str(number): name for name, number in CLASS_NUMBERS.items()},
+            "classes": {str(number): name for number, name in enumerate(TRAVERSABILITY_CLASSES)},
             "limits": {str(number): name for name, number in number_limits().items()},
             "not_surveyed": NOT_SURVEYED,
         }
@@ -180,6 +181,23 @@ class SurveyStore:
             raise PlanningError(
                 f"{show_file(self.path)} has chunks of {self.notes.layout.chunk} cells, not "
                 f"{chunk}; leave --chunk out to go on with it"
+            )
+
+    def check_map(self) -> None:
+        """Check that a map that is not kept in the store is still the one of its survey.
+
+        Raises:
+            PlanningError: It has changed, or cannot be read.
+        """
+        source = self.open_map()
+        changed = (
+            isinstance(source, GeoTiffMap)
+            and source.hash_content() != self.notes.description["map"]
+        )
+        if changed:
+            raise PlanningError(
+                f"{show_file(self.notes.map_file)} has changed since {show_file(self.path)} was "
+                "made"
             )
 
     def find_finished(self) -> set[Index]:

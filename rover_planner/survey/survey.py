@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.bounds.path import check_bounds, is_uncertain
 from rover_physics.terrain.grid import Terrain, fingerprint, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
@@ -14,7 +15,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob
 from rover_planner.survey.dask_cluster import ClusterSettings, check_machine
 from rover_planner.survey.geotiff import BAND, GeoTiffMap, is_geotiff
-from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED
+from rover_planner.survey.layers import NOT_SURVEYED
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
 from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.request import SurveyRequest
@@ -63,6 +64,7 @@ def prepare_survey(
     Raises:
         PlanningError: A map or a store that cannot be used.
         TerrainError: A terrain file that cannot be read.
+        ModelError: The policy has no bounds on a map with uncertain heights, or too many soils.
     """
     terrain: Terrain | None = None
     if is_geotiff(map_name):
@@ -74,6 +76,8 @@ def prepare_survey(
         frame, map_file, content = source.frame, str(source.path), source.hash_content()
     else:
         terrain = load_terrain(map_name, max_cells).fill_gaps(max_gap)
+        if is_uncertain(terrain, request.sigmas):
+            check_bounds(terrain, request.options)
         frame = MapFrame(terrain.elevation.shape, terrain.resolution, terrain.origin, "")
         map_file, content = "", fingerprint(terrain)
     notes = _make_notes(request, frame, map_file, content, chunk)
@@ -85,6 +89,8 @@ def prepare_survey(
     store.check(notes.description, None if chunk is None else notes.layout.chunk)
     finished = store.find_finished()
     left = [one for one in np.ndindex(store.notes.layout.chunks) if one not in finished]
+    if left and map_file != store.notes.map_file:  # the map is read from where it was
+        store.check_map()
     return PreparedSurvey(SurveyJob(request, out.absolute()), store, left)
 
 
@@ -99,8 +105,8 @@ def summarise(store: SurveyStore) -> dict[str, Any]:
     surveyed = cells - int(counts["best_class"][NOT_SURVEYED])
     shares = {
         name: {
-            which: round(int(count[CLASS_NUMBERS[which]]) / max(surveyed, 1), 6)
-            for which in TRAVERSABILITY_CLASSES
+            which: round(int(count[number]) / max(surveyed, 1), 6)
+            for number, which in enumerate(TRAVERSABILITY_CLASSES)
         }
         for name, count in counts.items()
     }

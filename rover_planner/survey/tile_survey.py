@@ -17,11 +17,14 @@ from rover_physics.results.uses import find_codes
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import elevation_of, find_block_max
-from rover_physics.traversability.classification import IMPASSABLE
 from rover_physics.traversability.judge import judge_poses
-from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses, hopeless_codes
+from rover_physics.traversability.pose_classes import (
+    IMPASSABLE,
+    RoverOnMap,
+    classify_poses,
+    hopeless_codes,
+)
 from rover_planner.survey.layers import (
-    CLASS_NUMBERS,
     NO_LIMIT,
     QUANTITIES,
     list_layers,
@@ -77,8 +80,10 @@ def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     """Return the layers (cells,) of a tile of unknown ground."""
     empty = list_layers(request.headings, request.turns, request.chance)
     layers = {name: np.full(cells, value) for name, value in empty.items()}
-    layers["worst_class"][:] = layers["best_class"][:] = CLASS_NUMBERS[IMPASSABLE]
+    layers["worst_class"][:] = layers["best_class"][:] = IMPASSABLE
     layers["first_limit"][:] = number_limits()["unknown_ground"]
+    if request.chance:
+        layers["worst_failure_chance"][:] = layers["best_failure_chance"][:] = 1.0
     return layers
 
 
@@ -163,8 +168,7 @@ class TileJudge:
     def _classify(self, poses: np.ndarray, limits: np.ndarray, refused: np.ndarray) -> np.ndarray:
         """Return the class (n,) of poses whose limits under the asked policy are known."""
         own = TORQUE_POLICIES.index(self._request.options.policy)
-        worst = CLASS_NUMBERS[IMPASSABLE]
-        classes = np.where(limits == NO_LIMIT, own, worst).astype(np.uint8)
+        classes = np.where(limits == NO_LIMIT, own, IMPASSABLE).astype(np.uint8)
         hopeless = [self._numbers[code] for code in hopeless_codes(self._on_map.is_uncertain)]
         is_open = ~refused & ~np.isin(limits, hopeless)
         others = [k for k in range(len(TORQUE_POLICIES)) if k != own]
@@ -176,7 +180,7 @@ class TileJudge:
                 found = classify_poses(self._on_map, poses[rows], asked)
                 better = (found >= 0) & (found < classes[rows])
                 classes[rows[better]] = found[better]
-        classes[refused] = worst
+        classes[refused] = IMPASSABLE
         return classes
 
     def _find_turns(self, poses: np.ndarray, passes: np.ndarray) -> np.ndarray:

@@ -5,8 +5,6 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from support.project.checkout import TOP
-
 _BLOCK = re.compile(
     r"(?:<!-- not run: (?P<not_run>[^\n]+) -->\n)?"
     r"^```(?P<language>sh|python)\n(?P<text>.*?)^```$"
@@ -19,8 +17,6 @@ _BLOCK = re.compile(
 class Block:
     """A code block of a page."""
 
-    page: str
-    """Path of the page from the top of the checkout."""
     language: str
     """Language named behind the opening backquotes."""
     text: str
@@ -33,8 +29,7 @@ class Block:
 
 def read_blocks(page: Path) -> list[Block]:
     """Return the blocks of a page in sh and Python, from top to bottom."""
-    name = page.relative_to(TOP).as_posix()
     return [
-        Block(name, one["language"], one["text"], one["not_run"] or "", one["output"])
+        Block(one["language"], one["text"], one["not_run"] or "", one["output"])
         for one in _BLOCK.finditer(page.read_text(encoding="utf-8"))
     ]

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Launch files without launch, which PyPI has not: what they start, and the commands of that."""
+"""Launch files without launch, which PyPI has not: what they start."""
 
-import contextlib
 import runpy
 import sys
-from collections.abc import Iterator
 from types import ModuleType, SimpleNamespace
 from typing import Any
 from unittest import mock
@@ -36,27 +34,15 @@ class Kept(SimpleNamespace):
         return context[self.given[0]]
 
 
-@contextlib.contextmanager
-def launch_modules() -> Iterator[None]:
-    """Put stand-ins for launch and launch_ros where imports look first."""
-    made = {name: ModuleType(name) for name in MODULES}
-    for name, classes in MODULES.items():
-        vars(made[name]).update({one: type(one, (Kept,), {}) for one in classes})
-    with mock.patch.dict(sys.modules, made):
-        yield
-
-
-def kind(action: Any) -> str:
-    """Return the name of an action's class."""
-    return type(action).__name__
-
-
 def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
     """Run a launch file; return its arguments with defaults, its other actions and its names."""
-    with launch_modules():
+    made = {module: ModuleType(module) for module in MODULES}
+    for module, classes in MODULES.items():
+        vars(made[module]).update({one: type(one, (Kept,), {}) for one in classes})
+    with mock.patch.dict(sys.modules, made):
         names = runpy.run_path(str(TOP / "launch" / name))
     actions = names["generate_launch_description"]().given[0]
-    declared = [action for action in actions if kind(action) == "DeclareLaunchArgument"]
+    declared = [action for action in actions if type(action).__name__ == "DeclareLaunchArgument"]
     assert all(action.description for action in declared)
     defaults = {action.given[0]: action.default_value for action in declared}
     return defaults, [action for action in actions if action not in declared], names
@@ -67,37 +53,3 @@ def start_rover(**given: str) -> list[Any]:
     defaults, (opaque,), _ = describe("rover.launch.py")
     assert given.keys() <= defaults.keys()
     return opaque.function(defaults | given)
-
-
-def simulation_commands(**given: str) -> dict[str, list[str]]:
-    """Return the command of each node that simulation.launch.py starts with arguments."""
-    defaults, (simulator, group), _ = describe("simulation.launch.py")
-    assert given.keys() <= defaults.keys()
-    values = defaults | given
-    passed = dict(group.given[0][0].launch_arguments)
-    nodes = [
-        simulator,
-        *start_rover(**{name: _value(one, values) for name, one in passed.items()}),
-    ]
-    return {node.executable: _command(node, values) for node in nodes}
-
-
-def _value(given: Any, values: dict[str, str]) -> Any:
-    """Return what an argument stands for: a text, or that of a substitution."""
-    while isinstance(given, Kept):
-        given = values[given.given[0]] if kind(given) == "LaunchConfiguration" else given.given[0]
-    return given
-
-
-def _command(node: Any, values: dict[str, str]) -> list[str]:
-    """Return the words that start a node as launch does."""
-    file, named = node.parameters
-    words = [sys.executable, "-m", f"rover_planner.nodes.{node.executable}", "--ros-args"]
-    words += ["-r", f"__node:={node.name}", "--params-file", _value(file, values)]
-    for source, target in node.remappings:
-        words += ["-r", f"{source}:={target}"]
-    for name, one in named.items():
-        value = _value(one, values)
-        is_text = isinstance(value, str) and getattr(one, "value_type", str) is str
-        words += ["-p", f"{name}:={repr(value) if is_text else str(value).lower()}"]
-    return words

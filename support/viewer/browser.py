@@ -19,16 +19,8 @@ sync_api = pytest.importorskip(
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 """Programs that are tried, in this order."""
 PROGRAM = next(filter(None, map(shutil.which, NAMES)), None)
-ARGUMENTS = [
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-"""Options of the browser: WebGL without a graphics card, and no network requests."""
+ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+"""Options of the browser: WebGL without a graphics card."""
 LAPTOP = {"width": 1280, "height": 720}
 """Size of a laptop's window [px]."""
 SCALE = 0.1
@@ -41,6 +33,8 @@ if (window !== window.top && location.protocol === "http:") {{
 """JavaScript that has the scene, a page within the page, scaled like the page: else it is not."""
 MEASURE = "selector => document.querySelector(selector)?.getBoundingClientRect()?.toJSON()"
 """JavaScript that finds and measures an element at one moment."""
+READ_LETTERS = Path(__file__).with_name("read_letters.js").read_text(encoding="utf-8")
+"""JavaScript that returns text, size [px] and contrast of all letters that are shown."""
 
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
@@ -95,14 +89,6 @@ class Visitor:
     def text(self, selector: str) -> str:
         """Return the text of an element of the page."""
         return str(self.tab.inner_text(selector))
-
-    def texts(self, selector: str) -> list[str]:
-        """Return the texts of all elements of a kind."""
-        return [str(text) for text in self.tab.locator(selector).all_inner_texts()]
-
-    def read_letters(self) -> Any:
-        """Return the text, size [px] and contrast of all letters that are shown."""
-        return self.tab.evaluate(Path(__file__).with_name("read_letters.js").read_text())
 
     def is_on_screen(self, selector: str) -> bool:
         """Return whether all of an element is within the window."""

@@ -22,7 +22,8 @@ from support.paths import poses_at
 from support.rovers import LSR1
 from support.waiting import wait_until
 
-START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
+STRAIGHT = poses_at(np.linspace(-1.0, 1.0, 101))
+"""Poses along x."""
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
 SURE = PathQueryOptions(count=5, spacing=0.5, waypoint_spacing=0.05, accepted_chance=1.0)
@@ -30,11 +31,6 @@ SURE = PathQueryOptions(count=5, spacing=0.5, waypoint_spacing=0.05, accepted_ch
 time of a verdict."""
 PATIENCE = 120.0
 """Longest wait for a page [s]; drawing and judging take seconds on a busy machine."""
-
-
-def straight(length: float = 2.0, spacing: float = 0.02) -> np.ndarray:
-    """Return poses (n, 3) along x from x = -1 m, with a length and a spacing [m]."""
-    return poses_at(np.arange(-1.0, length - 1.0 + 1e-9, spacing))
 
 
 def ramp(x, y):
@@ -120,17 +116,17 @@ wait_patiently = partial(wait_until, timeout=PATIENCE)
 """Returns the first true value of what a busy machine's page does late."""
 
 
-def is_at_rest(page: Any) -> bool:
-    """Return whether a page judges, paints and advises nothing, and shows what was found."""
-    if not any(work.progress for work in page.works):
-        ask(page, lambda: None)
-    return not any(work.progress for work in page.works)
-
-
 def wait_for_rest(page: Any) -> None:
-    """Wait until everything that is wanted is judged and shown."""
+    """Wait until everything that is wanted is judged, painted, advised and shown."""
     told = page.session
-    wait_patiently(lambda: (told.is_complete or told.refusal) and is_at_rest(page), "all of it")
+
+    def is_at_rest() -> bool:
+        if not any(work.progress for work in page.works):
+            ask(page, lambda: None)
+        is_done = told.is_complete or told.refusal
+        return bool(is_done) and not any(work.progress for work in page.works)
+
+    wait_patiently(is_at_rest, "all of it")
 
 
 @contextmanager

@@ -9,19 +9,21 @@ from itertools import permutations, takewhile
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, judge_path
+from rover_physics import judge_path
 from rover_physics.rover.steering_joints import tightest_radius
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
-from rover_planner.advice.case import SEARCH, Case
+from rover_planner.advice.case import SEARCH, Case, case_of
 from rover_planner.advice.levers import LEVERS, Choice
 from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
-from support.grounds import make_terrain, rock_left
-from support.rough_grounds import enlarged
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.site import Site
+from support.grounds import enlarged, make_terrain, rock_left
 from support.rovers import FIXED, LSR1, M2020, similar
 
 S = np.arange(-1.5, 1.6, 0.05)
@@ -46,7 +48,7 @@ CASES = {
 
 
 def refused_by(height, **options):
-    return Case(LSR1, make_terrain(height, half=2.6), STRAIGHT, SweepOptions(**options))
+    return Case(Site(LSR1, make_terrain(height, half=2.6)), STRAIGHT).change(**options)
 
 
 @cache
@@ -56,6 +58,13 @@ def advise_on(name: str) -> tuple[Advice, set[str]]:
     single = takewhile(lambda one: len(one.tried) < 2, grow_advice(refused_by(height, **options)))
     *_, advice = single
     return advice, levers
+
+
+@pytest.mark.parametrize("asked, accepted", [(0.0, 0.0), (0.2, 0.2), (1.0, ACCEPTED_CHANCE)])
+def test_remedies_have_the_chance_that_is_accepted_or_else_the_usual_one(asked, accepted):
+    options = PathQueryOptions(accepted_chance=asked)
+    case = case_of(Site(LSR1, make_terrain(slope), options), STRAIGHT)
+    assert case.site.options.accepted_chance == accepted
 
 
 @pytest.fixture(params=CASES)
@@ -98,7 +107,7 @@ def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):
     place = MarkedPlace(0.3, 0.0, 0.2, "stuck", "today")
     monkeypatch.setattr(seek, "LEVERS", [one for one in LEVERS if one.name in ("policy", "shift")])
     level = make_terrain(lambda x, y: 0.0 * x, half=2.6)
-    *_, advice = grow_advice(Case(LSR1, level, STRAIGHT, marked=MarkedPlaces((place,))))
+    *_, advice = grow_advice(Case(Site(LSR1, level, marked=MarkedPlaces((place,))), STRAIGHT))
     assert advice.judged.verdict.code == MARKED_CODE
     (shift,) = advice.remedies
     x, y, _ = shift.judged.case.poses.T
@@ -119,7 +128,7 @@ def test_several_levers_are_set_where_none_helps_alone(monkeypatch):
     still = [one for one in seek.LEVERS if not one.changes_path]
     monkeypatch.setattr(seek, "LEVERS", still)
     steep = make_terrain(lambda x, y: 0.45 * x, half=2.6)
-    case = Case(LSR1, steep, STRAIGHT[24:36], SweepOptions(payload=6.0))
+    case = Case(Site(LSR1, steep), STRAIGHT[24:36]).change(payload=6.0)
     for advice in grow_advice(case):
         own = [one for one in advice.found if not one.needs_others]
         if len(advice.tried) < 2:
@@ -194,7 +203,7 @@ def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):
     def gate(x, y):
         return 1.0 * ((np.abs(x) < 0.2) & (np.abs(y - 0.4) > 0.42))
 
-    case = replace(refused_by(gate), terrain=make_terrain(gate, resolution=0.02, half=2.4))
+    case = refused_by(gate).change_site(terrain=make_terrain(gate, resolution=0.02, half=2.4))
     _, coarse, fine, _ = grow_advice(case)
     assert not coarse.found and coarse.tried == fine.tried == ("curve",)
     (setting,) = fine.found[0].levers
@@ -218,7 +227,7 @@ def test_the_way_around_passes_and_is_as_long_for_the_size_of_the_rover(size, mo
     def way_around(size: float) -> float:
         ground = enlarged(make_terrain(rock_left, half=3.0), size)
         poses = STRAIGHT * [size, size, 1.0]
-        case = Case(similar(LSR1, size), ground, poses)
+        case = Case(Site(similar(LSR1, size), ground), poses)
         path = case.judge().path_around
         np.testing.assert_allclose(path[[0, -1]], poses[[0, -1]], atol=1e-9)
         assert replace(case, poses=path).judge().passes

@@ -168,7 +168,6 @@ PREDICT = ["predict", "lsr1", "terrain.npz", "poses.npz", "out.npz"]
 REFUSED = [
     ([], "command"),
     (["dance"], "dance"),
-    (["predict"], "ROVER"),
     ([*PREDICT, "--tool-force", "0", "1"], "tool-force"),
     ([*PREDICT, "--arm", "arm_yaw=nan"], "NAME=RAD"),
     ([*PREDICT, "--arm", "arm_yaw=0.1"], "lacks arm_shoulder, arm_elbow"),

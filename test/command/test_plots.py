@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from rover_planner.demo.answers_picture import draw_answers
 from rover_planner.demo.goals import Goal
 from rover_planner.figures.path_picture import _draw_uses, draw_path
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
@@ -28,9 +29,9 @@ def holed():
 
 def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, holed):
     goals = {"A": (0, 0, 0), "B": (4, 3, 0.5), "C": (9, 0, 0)}
+    judge = PathJudge(Site(LSR1, holed, COARSE))
     answers = [
-        (Goal(name, "plain", goal), answer_path_query(LSR1, holed, (-4, 0, 0), goal, COARSE))
-        for name, goal in goals.items()
+        (Goal(name, "plain", goal), judge.search((-4, 0, 0), goal)) for name, goal in goals.items()
     ]
     assert [answer.traversable for _, answer in answers] == [True, False, False]
     path = tmp_path / "picture.svg"
@@ -42,9 +43,7 @@ def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_p
 
 def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(tmp_path):
     ground = make_terrain(lambda x, y: 0.0 * x, half=2.0)
-    question = SearchQuery(
-        Site(LSR1, ground, PathQueryOptions()), (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
-    )
+    question = SearchQuery(Site(LSR1, ground), (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))
     draw_path(tmp_path / "plan.svg", question, answer, "hill.npz")
     text = (tmp_path / "plan.svg").read_text()
@@ -54,7 +53,7 @@ def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_lim
 
 def test_the_use_along_a_plan_has_the_peaks_between_waypoints():
     bump = make_terrain(lambda x, y: 0.06 * ((x > 0.3) & (x < 0.5)))
-    path = check_path(LSR1, bump, poses_at(np.linspace(-1.0, 1.0, 41)))
+    path = PathJudge(Site(LSR1, bump)).check(poses_at(np.linspace(-1.0, 1.0, 41)))
     axes = Figure().subplots()
     _draw_uses(axes, LSR1, path)
     highest = max(np.nanmax(line.get_ydata()) for line in axes.lines[:-1])
@@ -66,9 +65,9 @@ def test_forces_that_no_verdict_asks_for_are_shaded(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
     ledge = make_terrain(lambda x, y: 0.06 * (x < -2.5), half=4.5)
-    options = PathQueryOptions(count=1)
+    judge = PathJudge(Site(LSR1, ledge, PathQueryOptions(count=1)))
     for goal, is_beyond in (((-3.2, 0, 0), False), ((-1.5, 0, 0), True)):
-        answer = answer_path_query(LSR1, ledge, (-3.5, 0, 0), goal, options)
+        answer = judge.search((-3.5, 0, 0), goal)
         falls = answer.chosen.prediction.falling.any(axis=1)
         assert (0 < falls.sum() < len(falls)) == is_beyond
         asked = Goal("A", "plain", goal)

@@ -12,11 +12,12 @@ frictions = st.floats(0.15, 1.3)
 TOLD, NOISE = 0.8, 0.08
 
 
-def slip_on(ground: FrictionFilter, friction: float, count: int, seed: int = 0) -> None:
-    """Let wheels slip, with noise."""
-    rng = np.random.default_rng(seed)
+def slip_on(friction: float, count: int, seed: int = 0) -> FrictionFilter:
+    """Return a ground after wheels have slipped on it, with noise."""
+    ground, rng = FrictionFilter(TOLD), np.random.default_rng(seed)
     for use in friction * (1.0 + NOISE * rng.standard_normal(count)):
         ground.slip(float(use), NOISE, 1.0)
+    return ground
 
 
 def test_nothing_is_known_before_anything_is_felt_but_what_is_told():
@@ -38,9 +39,7 @@ def test_wheels_that_grip_bound_the_friction_from_below_only(uses):
 
 @given(frictions, st.integers(0, 50))
 def test_wheels_that_slip_measure_the_friction(friction, seed):
-    ground = FrictionFilter(TOLD)
-    slip_on(ground, friction, 12, seed)
-    estimate = ground.estimate
+    estimate = slip_on(friction, 12, seed).estimate
     assert estimate.mean == pytest.approx(friction, rel=0.15)
     assert estimate.low < estimate.mean < estimate.high
 
@@ -50,15 +49,13 @@ def test_the_interval_has_the_truth_in_nineteen_of_twenty_grounds():
     rng = np.random.default_rng(3)
     for seed in range(200):
         friction = float(rng.uniform(0.2, 1.0))
-        ground = FrictionFilter(TOLD)
-        slip_on(ground, friction, 4, seed)
-        within += ground.estimate.low <= friction <= ground.estimate.high
+        estimate = slip_on(friction, 4, seed).estimate
+        within += estimate.low <= friction <= estimate.high
     assert 180 <= within <= 199
 
 
 def test_one_wrong_measurement_moves_little():
-    ground = FrictionFilter(TOLD)
-    slip_on(ground, 0.5, 10)
+    ground = slip_on(0.5, 10)
     before = ground.estimate.mean
     ground.slip(1.1, NOISE, 1.0)
     ground.slip(0.1, NOISE, 1.0)
@@ -74,8 +71,7 @@ def test_the_first_measurement_is_not_drawn_towards_what_was_told(friction):
 
 
 def test_a_lower_friction_is_believed_within_a_metre_after_a_line():
-    ground = FrictionFilter(TOLD)
-    slip_on(ground, 0.7, 10)
+    ground = slip_on(0.7, 10)
     for _ in range(5):
         ground.drive(0.2)
         ground.slip(0.35, 0.22, 0.5)
@@ -84,8 +80,7 @@ def test_a_lower_friction_is_believed_within_a_metre_after_a_line():
 
 
 def test_slips_before_a_line_do_not_bound_the_ground_that_is_proved_to_be_another():
-    ground = FrictionFilter(TOLD)
-    slip_on(ground, 0.26, 10)
+    ground = slip_on(0.26, 10)
     ground.drive(1.0)
     assert ground.estimate.high is not None
     ground.grip(0.45)

@@ -10,17 +10,19 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.learning.drive_log import RATES, STEERING, SUSPENSION, TIME, TORQUES, YAW, X
 from rover_planner.learning.ground_learner import GroundLearner
-from support.learning_drives import climb, ramp, row_of_plant
+from support.grounds import plane
+from support.learning_drives import climb, row_of_plant
 from support.reference_drives import drive_ground
 
 SPEED = 0.06
 ROVER = replace(load_rover("lsr1"), nominal_speed=SPEED)
 SLOPE = 0.3
+RAMP, LEVEL = (plane(slope, 0.0, half=3.0) for slope in (SLOPE, 0.0))
 
 
-def learn(rows, terrain=None, rover=ROVER) -> GroundLearner:
+def learn(rows, terrain=RAMP, rover=ROVER) -> GroundLearner:
     """Return a learner that has taken rows."""
-    learner = GroundLearner(rover, ramp(SLOPE) if terrain is None else terrain)
+    learner = GroundLearner(rover, terrain)
     for row in rows:
         learner.take(row)
     return learner
@@ -46,28 +48,28 @@ def test_wheels_that_roll_because_they_are_steered_do_not_slip():
     offset, rate = 0.04, 0.35  # from a contact at the rim of the width
     rows[:, STEERING.start] = rate * (rows[:, TIME] % 4.0)
     rows[:, RATES.start] += offset * rate / ROVER.wheel.radius
-    assert learn(rows, ramp(0.0)).estimate.slip_time is None
+    assert learn(rows, LEVEL).estimate.slip_time is None
 
 
 def test_ground_is_marked_where_wheels_have_been():
     learner = learn(climb(ROVER, SLOPE, 20.0)[::5])
     known = np.isfinite(learner.layers[0])
-    x, y = ramp(SLOPE).origin
+    x, y = RAMP.origin
     rows, columns = np.nonzero(known)
     assert known.any() and np.abs(y + 0.04 * rows).min() > 0.2
     assert np.abs(x + 0.04 * columns).max() < 1.4
     assert (learner.layers[1][known] > 0.0).all()
+    assert (learner.layers[0][known] <= ROVER.friction).all()  # all grip: it is told, no more
 
 
 def test_wheels_that_slip_on_one_class_of_ground_tell_all_of_it_and_nothing_of_another():
-    ground = ramp(SLOPE)
-    x = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])
-    y = ground.origin[1] + ground.resolution * np.arange(ground.elevation.shape[0])
+    x = RAMP.origin[0] + RAMP.resolution * np.arange(RAMP.elevation.shape[1])
+    y = RAMP.origin[1] + RAMP.resolution * np.arange(RAMP.elevation.shape[0])
     classes = np.where(x > 0.0, 7.0, 4.0) + 0.0 * y[:, None]
     classes[y > 1.0] = np.nan
     rows = climb(ROVER, SLOPE, 40.0, speed=0.04)[::5]
     rows[rows[:, X] > 0.4, RATES] *= 1.6
-    learner = learn(rows, replace(ground, ground_class=classes))
+    learner = learn(rows, replace(RAMP, ground_class=classes))
     slick, other = learner.estimate.classes[7], learner.estimate.classes[4]
     assert slick.low < SLOPE < slick.high
     assert other.high is None and other.mean > 0.7
@@ -226,7 +228,7 @@ def test_torques_of_a_rover_that_stands_are_not_frozen_because_others_are_missin
     rows = climb(ROVER, 0.0, 8.0)[::5]
     rows[rows[:, TIME] > 4.0, TORQUES] = 0.0
     rows[:, TORQUES.start : TORQUES.start + 3] = np.nan
-    assert set(learn(rows, ramp(0.0)).estimate.faults.values()) == {"no torque"}
+    assert set(learn(rows, LEVEL).estimate.faults.values()) == {"no torque"}
 
 
 def test_torques_that_wheels_apply_to_each_other_on_the_spot_are_no_wrong_signs():
@@ -235,7 +237,7 @@ def test_torques_that_wheels_apply_to_each_other_on_the_spot_are_no_wrong_signs(
     rows[:, STEERING], rows[:, RATES] = turn.angles, turn.speeds / ROVER.wheel.radius
     rows[:, YAW] += 0.1 * rows[:, TIME]
     rows[:, TORQUES] = 0.1 * ROVER.weight * ROVER.wheel.radius * np.array([0, 0, -1, 1, 0, 0])
-    assert not learn(rows, ramp(0.0)).estimate.faults
+    assert not learn(rows, LEVEL).estimate.faults
 
 
 def test_slip_is_seen_without_any_torque_and_measures_nothing():

@@ -12,7 +12,8 @@ from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.learning.drive_log import PITCH, ROLL, STEERING, SUSPENSION, TIME, TORQUES, X
 from support.command_line import assert_refused, predict_arguments
-from support.learning_drives import NAMES, climb, ramp, write_csv
+from support.grounds import plane
+from support.learning_drives import NAMES, climb, write_csv
 from support.rovers import LSR1 as ROVER
 
 SLOPE = 0.3
@@ -21,7 +22,7 @@ SLOPE = 0.3
 @pytest.fixture
 def folder(tmp_path):
     """Return a folder with a terrain and a drive on it."""
-    save_terrain(tmp_path / "ramp.npz", ramp(SLOPE))
+    save_terrain(tmp_path / "ramp.npz", plane(SLOPE, 0.0, half=3.0))
     write_csv(tmp_path / "drive.csv", climb(ROVER, SLOPE, 8.0))
     return tmp_path
 
@@ -30,15 +31,15 @@ def arguments(folder, log="drive.csv", rover="lsr1"):
     return ["learn", str(rover), *(str(folder / n) for n in ("ramp.npz", log, "out.json"))]
 
 
-def friction_of(folder):
-    return json.loads((folder / "out.json").read_text())["friction"]
+def learn(folder, *words, log="drive.csv", rover="lsr1"):
+    """Learn from a drive; return what is in the file."""
+    assert main([*arguments(folder, log, rover), *map(str, words)]) == 0
+    return json.loads((folder / "out.json").read_text())
 
 
 def test_a_drive_without_slip_leaves_the_friction_open_above(folder, capfd):
     picture, ground = folder / "out.png", folder / "ground.npz"
-    words = ["--picture", str(picture), "--ground", str(ground)]
-    assert main([*arguments(folder), *words]) == 0
-    found = json.loads((folder / "out.json").read_text())
+    found = learn(folder, "--picture", picture, "--ground", ground)
     assert found["friction"]["high"] is None
     assert 0.0 < found["friction"]["low"] < SLOPE < found["friction"]["mean"]
     assert found["slip_time"] is None and found["immobilised_time"] is None
@@ -48,23 +49,19 @@ def test_a_drive_without_slip_leaves_the_friction_open_above(folder, capfd):
 
 
 def test_columns_come_in_any_order_and_some_may_be_missing(folder):
-    assert main(arguments(folder)) == 0
-    usual = friction_of(folder)
+    usual = learn(folder)["friction"]
     names = [name for name in NAMES if "steering" not in name]
     write_csv(folder / "drive.csv", climb(ROVER, SLOPE, 8.0), names[::-1])
-    assert main(arguments(folder)) == 0
-    assert friction_of(folder) == usual
+    assert learn(folder)["friction"] == usual
 
 
 def test_a_soil_is_learned_where_one_is_told(folder):
-    assert main([*arguments(folder), "--soil", "dry_sand"]) == 0
-    soil = json.loads((folder / "out.json").read_text())["soil"]
+    soil = learn(folder, "--soil", "dry_sand")["soil"]
     assert soil["resistance"]["mean"] < 0.1 and "modulus" in soil["told_apart"]  # it rolls freely
 
 
 def test_motor_currents_serve_with_the_constant_of_the_rover_file(folder, capfd):
-    assert main(arguments(folder)) == 0
-    usual = friction_of(folder)
+    usual = learn(folder)["friction"]
     log = folder / "drive.csv"
     log.write_text(log.read_text().replace("_torque", "_current", 6))
     assert_refused(capfd, main(arguments(folder)), "torque_per_current")
@@ -72,8 +69,7 @@ def test_motor_currents_serve_with_the_constant_of_the_rover_file(folder, capfd)
     save_rover(rover, ROVER)
     text = rover.read_text().replace("servo_droop: 0.3", "servo_droop: 0.3, torque_per_current: 1")
     rover.write_text(text)
-    assert main(arguments(folder, rover=rover)) == 0
-    assert friction_of(folder) == usual
+    assert learn(folder, rover=rover)["friction"] == usual
 
 
 def test_force_sensors_replace_loads_and_tractions(folder):
@@ -82,8 +78,7 @@ def test_force_sensors_replace_loads_and_tractions(folder):
     values = ",".join(["5.0,10.0"] * 6)
     lines = [f"{lines[0]},{','.join(felt)}", *(f"{line},{values}" for line in lines[1:])]
     (folder / "drive.csv").write_text("\n".join(lines))
-    assert main(arguments(folder)) == 0
-    assert friction_of(folder)["low"] == pytest.approx(0.5 * 0.84, abs=0.03)
+    assert learn(folder)["friction"]["low"] == pytest.approx(0.5 * 0.84, abs=0.03)
 
 
 @pytest.mark.parametrize(
@@ -130,19 +125,17 @@ def test_torques_that_were_not_measured_are_named_on_the_terminal(folder, capfd)
     rows = climb(ROVER, SLOPE, 8.0)
     rows[:, TORQUES.start : TORQUES.stop : 3] = np.nan
     write_csv(folder / "drive.csv", rows)
-    assert main(arguments(folder)) == 0
+    learn(folder)
     warning = "sensors that were not believed: rear_right no torque, rear_left no torque"
     assert capfd.readouterr().err == f"warning: {warning}\n"
 
 
 def test_a_spike_of_an_angle_is_ignored(folder):
-    assert main(arguments(folder)) == 0
-    usual = friction_of(folder)
+    usual = learn(folder)["friction"]
     rows = climb(ROVER, SLOPE, 8.0)
     rows[200, PITCH], rows[300, SUSPENSION] = 500.0, -500.0
     write_csv(folder / "drive.csv", rows)
-    assert main(arguments(folder)) == 0
-    assert friction_of(folder)["mean"] == pytest.approx(usual["mean"], rel=0.02)
+    assert learn(folder)["friction"]["mean"] == pytest.approx(usual["mean"], rel=0.02)
 
 
 def test_a_prediction_takes_what_was_learned_in_place_of_the_told_friction(folder, capfd):
@@ -174,12 +167,8 @@ def test_a_bag_tells_the_same_as_a_csv_file(folder, capfd):
             stamp = 1_700_000_000_000_000_000 + round(1e9 * row[TIME])
             bag.write("/joint_states", joints, stamp)
             bag.write("/odometry", odometry, stamp + 1)
-    found = []
-    for log in ("bag", "drive.csv"):
-        assert main(arguments(folder, log)) == 0
-        found.append(friction_of(folder))
-    assert found[0]["low"] == pytest.approx(found[1]["low"], rel=0.01)
-    assert found[0]["high"] is None
+    of_bag, of_csv = (learn(folder, log=log)["friction"] for log in ("bag", "drive.csv"))
+    assert of_bag["low"] == pytest.approx(of_csv["low"], rel=0.01) and of_bag["high"] is None
     with write_bag(folder / "empty") as bag:
         bag.write("/odometry", odometry, 1)
     assert_refused(capfd, main(arguments(folder, "empty")), "joints")

@@ -9,14 +9,12 @@ import pytest
 from rover_planner.learning.stuck_watch import StuckWatch
 from rover_planner.learning.wheel_slip import SlipWindow
 
-SPEED, MAX_TORQUE, PERIOD, DURATION = 0.06, 5.0, 0.1, 0.5
+SPEED, MAX_TORQUE, PERIOD, DURATION, DEVIATION = 0.06, 5.0, 0.1, 0.5, 0.02
 
 
-def window(
-    time: float, x: float, rolling: float, deviation: float, scrub: float = 0.0
-) -> SlipWindow:
+def window(time: float, x: float, rolling: float, scrub: float = 0.0) -> SlipWindow:
     """Return a window at whose middle the wheels were at x."""
-    told = {"time": time, "duration": DURATION, "deviation": deviation, "excess": 0.0}
+    told = {"time": time, "duration": DURATION, "deviation": DEVIATION, "excess": 0.0}
     told |= {"rolling": np.full(6, rolling), "scrub": np.full(6, scrub), "unsteadiness": 0.0}
     told |= {"places": np.tile([x, 0.0], (6, 1))}
     return SlipWindow(
@@ -29,7 +27,7 @@ def first_notice(speed: float, rolling: float, torque: float, climb: float = 0.0
     watch = StuckWatch(SPEED, MAX_TORQUE)
     for time in PERIOD * np.arange(1, 100):
         x = speed * (time - 0.5 * DURATION)
-        one = window(float(time), x, rolling, deviation=0.02)
+        one = window(float(time), x, rolling)
         if watch.update(one, np.full(6, torque), climb):
             return float(time)
     return None
@@ -46,7 +44,7 @@ def test_a_rover_that_stands_while_its_wheels_turn_or_push_is_stuck_within_two_s
 def test_a_rover_whose_wheels_stand_and_then_spin_is_stuck_from_when_it_stands():
     watch = StuckWatch(SPEED, MAX_TORQUE)
     for time in PERIOD * np.arange(1, 20):
-        one = window(float(time), 0.0, 0.0 if time < 1.0 else SPEED, deviation=0.02)
+        one = window(float(time), 0.0, 0.0 if time < 1.0 else SPEED)
         stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
         assert stuck == (time > 1.25)
 
@@ -61,7 +59,7 @@ def test_a_rover_that_turns_back_is_not_stuck():
     for time in PERIOD * np.arange(1, 60):
         after = np.clip((time - turn) / (0.5 * DURATION), -1.0, 1.0)
         share = back if after > 0.0 else 1.0
-        one = window(float(time), SPEED * share * abs(time - turn), SPEED * share * after, 0.02)
+        one = window(float(time), SPEED * share * abs(time - turn), SPEED * share * after)
         assert not watch.update(one, np.ones(6), 0.0)
 
 
@@ -73,7 +71,7 @@ def test_a_rover_that_rests_or_climbs_is_not_stuck():
 def test_a_rover_that_stands_while_its_wheels_are_steered_is_not_stuck():
     watch = StuckWatch(SPEED, MAX_TORQUE)
     for time in PERIOD * np.arange(1, 40):
-        one = window(float(time), 0.0, 0.0, deviation=0.02, scrub=0.014 if time < 2.6 else 0.0)
+        one = window(float(time), 0.0, 0.0, scrub=0.014 if time < 2.6 else 0.0)
         stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
         assert stuck == (time > 3.75)
 
@@ -82,8 +80,8 @@ def test_a_rover_that_turns_on_the_spot_or_steers_is_not_stuck():
     turns, steers = StuckWatch(SPEED, MAX_TORQUE), StuckWatch(SPEED, MAX_TORQUE)
     for time in PERIOD * np.arange(1, 60):
         around = 0.15 * time + np.arange(6.0)
-        one = window(float(time), 0.0, SPEED, deviation=0.02)
+        one = window(float(time), 0.0, SPEED)
         places = 0.4 * np.column_stack([np.cos(around), np.sin(around)])
         assert not turns.update(replace(one, places=places), np.ones(6), 0.0)
-        one = window(float(time), 0.0, 0.2 * SPEED, deviation=0.02, scrub=0.25 * SPEED)
+        one = window(float(time), 0.0, 0.2 * SPEED, scrub=0.25 * SPEED)
         assert not steers.update(one, np.ones(6), 0.0)

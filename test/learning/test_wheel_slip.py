@@ -2,6 +2,7 @@
 """How well a slip is known: as well as that of the wheel that is known worst, and not at once."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rover_physics.numerics.records import new_record
 from rover_planner.learning.contact_sense import WHEEL_STATE
@@ -17,20 +18,13 @@ def turn_on_the_spot(blocks: int) -> list[SlipWindow]:
     rng, windows = np.random.default_rng(0), SlipWindows(RADIUS, 0.08)
     found = []
     for time in BLOCK * np.arange(blocks):
-        yaw = RATE * time + NOISE * rng.standard_normal()
-        centres = turned(PLACES, yaw)
-        along = turned(PLACES / np.linalg.norm(PLACES, axis=1, keepdims=True), yaw + 0.5 * np.pi)
-        axles = turned(along, 0.5 * np.pi)
-        state = new_record(WHEEL_STATE, centres=centres, along=along, axles=axles)
+        turn = Rotation.from_euler("z", RATE * time + NOISE * rng.standard_normal())
+        outwards = turn.apply(PLACES / np.linalg.norm(PLACES, axis=1, keepdims=True))
+        along = np.cross([0.0, 0.0, 1.0], outwards)
+        state = new_record(WHEEL_STATE, centres=turn.apply(PLACES), along=along, axles=-outwards)
         rolled = RATE * time * np.hypot(*PLACES[:, :2].T) / RADIUS
         found.append(windows.take(float(time), rolled, state))
     return [window for window in found if window is not None]
-
-
-def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
-    """Return vectors (n, 3) turned about z [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return vectors @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def test_errors_of_the_heading_are_noise_of_the_slips_of_outer_wheels_and_at_first_count_more():

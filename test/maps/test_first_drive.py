@@ -45,12 +45,6 @@ class Drive:
         now = self.keeper.take(seen, "elevation_cloud", self.time, standing)
         self.service.take_terrain(now.terrain, "elevation_cloud", None, now.sources)
 
-    def go(self) -> None:
-        """Drive for a second."""
-        for _ in range(10):
-            self.time += 0.1
-            assert not self.simulation.advance(self.time, 0.1).stopped
-
 
 def test_the_first_drive_is_accepted_and_reaches_its_goal():
     drive = Drive(footprint_margin=MARGIN)
@@ -60,7 +54,9 @@ def test_the_first_drive_is_accepted_and_reaches_its_goal():
     path = first.candidate.poses
     drive.simulation.take_path(path)
     while drive.simulation.follows_path:
-        drive.go()
+        for _ in range(10):
+            drive.time += 0.1
+            assert not drive.simulation.advance(drive.time, 0.1).stopped
         assert drive.time < 200.0
         drive.look()
         # What was seen stays: the path is still passable where the camera does not look.

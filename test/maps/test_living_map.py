@@ -9,7 +9,7 @@ import pytest
 from rover_physics import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
-from rover_planner.maps.changes import find_changes, have_same_layers
+from rover_planner.maps.changes import find_changes
 from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto
 from rover_planner.parameters.traverse_server import SUREST, TraverseServerParameters
 from rover_planner.planning.answering.living_map import LivingMap
@@ -73,31 +73,28 @@ def test_a_loaded_map_survives_100_local_updates_to_the_bit():
     assert merged.elevation_std is None
 
 
-def test_the_newer_height_wins_whichever_arrives_last():
+@pytest.mark.parametrize(
+    ("source", "maps"),
+    [
+        # height and time of each map, and which of the two heights wins
+        ("rear", [(0.1, 10.0, 0.1), (0.2, 9.0, 0.1), (0.3, 11.0, 0.3)]),
+        (TOPIC, [(0.1, 1e9, 0.1), (0.2, 3.0, 0.2)]),  # its clock went back
+    ],
+)
+def test_the_newer_height_wins_whichever_arrives_last(source, maps):
     living = LivingMap()
-    living.merge(local_map((0.0, 0.0), 0.1), "front", 10.0)
-    living.merge(local_map((0.0, 0.0), 0.2), "rear", 9.0)
-    assert cell(living, 0.5, 0.5) == (0.1, "front", 10.0)
-    living.merge(local_map((0.0, 0.0), 0.3), "rear", 11.0)
-    assert cell(living, 0.5, 0.5) == (0.3, "rear", 11.0)
-
-
-def test_a_source_whose_clock_goes_back_is_still_heard():
-    living = LivingMap()
-    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1e9)
-    living.merge(local_map((0.0, 0.0), 0.2), TOPIC, 3.0)
-    assert cell(living, 0.5, 0.5) == (0.2, TOPIC, 3.0)
+    for k, (height, time, winner) in enumerate(maps):
+        living.merge(local_map((0.0, 0.0), height), source if k else TOPIC, time)
+        assert cell(living, 0.5, 0.5)[0] == winner
+    assert cell(living, 0.5, 0.5)[1:] == (source, maps[-1][1])
 
 
 def test_the_surer_height_wins_until_it_has_aged():
     living = LivingMap(TraverseServerParameters(map_merge=SUREST, map_ageing=0.001))
-    living.merge(local_map((0.0, 0.0), 0.1, std=0.01), TOPIC, 0.0)
-    living.merge(local_map((0.0, 0.0), 0.2, std=0.03), TOPIC, 10.0)
-    assert cell(living, 0.5, 0.5)[0] == 0.1
-    living.merge(local_map((0.0, 0.0), 0.3, std=0.03), TOPIC, 40.0)
-    assert cell(living, 0.5, 0.5)[0] == 0.3
-    living.merge(local_map((0.0, 0.0), 0.4, std=0.002), TOPIC, 41.0)
-    assert cell(living, 0.5, 0.5)[0] == 0.4
+    maps = [(0.1, 0.01, 0.0, 0.1), (0.2, 0.03, 10.0, 0.1), (0.3, 0.03, 40.0, 0.3)]
+    for height, std, time, winner in [*maps, (0.4, 0.002, 41.0, 0.4)]:
+        living.merge(local_map((0.0, 0.0), height, std=std), TOPIC, time)
+        assert cell(living, 0.5, 0.5)[0] == winner
     np.testing.assert_array_equal(living.snapshot().terrain.elevation_std, 0.002)
 
 
@@ -243,19 +240,3 @@ def test_a_cell_of_any_layer_that_differs_is_found(layer, value):
     assert found.shape == (14, 17) and np.argwhere(found).tolist() == [[8, 3]]
     back = find_changes(replace(ground(), **{layer: values}), ground())
     assert np.argwhere(back).tolist() == [[8, 3]]
-
-
-def test_in_a_window_that_moved_only_new_cells_and_the_edge_differ():
-    whole = np.random.default_rng(1).standard_normal((20, 30))
-    old, new = Terrain(whole[2:14, 5:20], 0.1), Terrain(whole[4:16, 2:17], 0.1)
-    is_new = np.ones((14, 17), bool)
-    is_new[1:11, 4:16] = False
-    np.testing.assert_array_equal(find_changes(old, new, (2, -3)), is_new)
-
-
-def test_layers_and_soils_must_be_the_same():
-    assert have_same_layers(ground(), ground(5))
-    assert not have_same_layers(ground(), replace(ground(), friction=None))
-    soil = np.zeros((12, 15), np.int32)
-    sand = replace(ground(), soil=soil, soil_names=("mars_simulant",))
-    assert not have_same_layers(ground(), sand)

@@ -43,10 +43,8 @@ def prediction():
 def test_an_array_has_labelled_dimensions_and_values_of_their_number():
     values = np.arange(12.0).reshape(2, 6)
     message = waypoint_array(values)
-    assert [(dim.label, dim.size, dim.stride) for dim in message.layout.dim] == [
-        ("waypoint", 2, 12),
-        ("wheel", 6, 6),
-    ]
+    dimensions = [(one.label, one.size, one.stride) for one in message.layout.dim]
+    assert dimensions == [("waypoint", 2, 12), ("wheel", 6, 6)]
     assert isinstance(message.data, array.array) and message.data.typecode == "d"
     np.testing.assert_array_equal(array_values(message), values)
     message.data = message.data[:-1]
@@ -91,10 +89,8 @@ def test_a_settled_path_has_height_and_full_orientation(prediction):
         place = pose.pose.position
         np.testing.assert_array_equal((place.x, place.y, place.z), prediction.position[i])
         turn = pose.pose.orientation
-        np.testing.assert_array_equal(
-            (turn.x, turn.y, turn.z, turn.w),
-            xyzw_from_rpy(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]),
-        )
+        right = xyzw_from_rpy(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2])
+        np.testing.assert_array_equal((turn.x, turn.y, turn.z, turn.w), right)
         assert abs(turn.x) > 1e-3 and abs(turn.y) > 1e-3
         assert pose.header == path.header and path.header.stamp == STAMP
 
@@ -122,25 +118,20 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
 
 
 def test_every_entry_of_a_verdict_becomes_a_key_and_a_value():
-    entries = {
-        "traversable": False,
-        "code": "tilt",
-        "first_failure": 7,
-        "mismatch": {"rocker_left": 0.25},
-        "goal": [1.0, None],
+    told = {
+        "traversable": (False, "false"),
+        "code": ("tilt", "tilt"),
+        "mismatch": ({"rocker_left": 0.25}, '{"rocker_left": 0.25}'),
+        "goal": ([1.0, None], "[1.0, null]"),
     }
+    entries = {key: value for key, (value, _) in told.items()}
     message = verdict_to_diagnostics("error", "tilt 0.6 rad", entries, "lsr1", HEADER)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
     (status,) = message.status
     assert status.level == DiagnosticStatus.ERROR and status.message == "tilt 0.6 rad"
     assert status.hardware_id == "lsr1" and status.name
-    assert {entry.key: entry.value for entry in status.values} == {
-        "traversable": "false",
-        "code": "tilt",
-        "first_failure": "7",
-        "mismatch": '{"rocker_left": 0.25}',
-        "goal": "[1.0, null]",
-    }
+    values = {entry.key: entry.value for entry in status.values}
+    assert values == {key: text for key, (_, text) in told.items()}
 
 
 @pytest.mark.parametrize("number", [math.nan, -math.inf])

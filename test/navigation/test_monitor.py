@@ -21,8 +21,7 @@ from rover_planner.planning.navigation.monitor import (
 )
 from rover_planner.planning.navigation.watched_path import USUAL_RADIUS, WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
-from support.grounds import make_terrain, wall_at, waves
-from support.rough_grounds import with_std
+from support.grounds import make_terrain, wall_at, waves, with_std
 from support.services import make_service
 
 STRAIGHT = np.column_stack([np.linspace(-2.0, 2.0, 201), np.zeros(201), np.zeros(201)])
@@ -103,7 +102,7 @@ def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_
     service.take_terrain(large)
     found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
     assert found.state == STOPPED
-    assert found.judgement.judge.site.terrain.elevation.size < 0.2 * large.elevation.size
+    assert found.judgement.site.terrain.elevation.size < 0.2 * large.elevation.size
 
 
 @pytest.mark.parametrize(

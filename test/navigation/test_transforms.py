@@ -111,8 +111,7 @@ class World:
 
 
 def assert_same(one: Rigid, other: Rigid) -> None:
-    np.testing.assert_allclose(one.translation, other.translation, atol=1e-9)
-    np.testing.assert_allclose(one.rotation.as_matrix(), other.rotation.as_matrix(), atol=1e-9)
+    np.testing.assert_allclose(matrix(one), matrix(other), atol=1e-9)
 
 
 def test_odometry_and_the_mount_tell_where_a_sensor_was_at_the_stamp():

@@ -16,7 +16,7 @@ from rover_planner.ros.guard import Guard
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import call
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 
 @pytest.fixture
@@ -124,12 +124,7 @@ def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(
     wait_until(lambda: not topic.has_listeners, "the leave")
     topic.publish(lambda: Int32(data=2))
     _, heard = listen(ros)
-
-    def catch_up():
-        topic.catch_up()
-        return heard
-
-    wait_until(catch_up, "the latest")
+    repeat_until(topic.catch_up, lambda: heard, "the latest")
     assert heard == [2]
 
 

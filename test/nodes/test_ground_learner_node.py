@@ -2,8 +2,8 @@
 """The node ground_learner tells what a drive over ROS shows, and stops a rover that is stuck."""
 
 import json
-import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -24,11 +24,12 @@ from rover_planner.nodes import ground_learner
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
 from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
-from support.learning_drives import climb, ramp
+from support.grounds import plane
+from support.learning_drives import climb
 from support.messages import row_messages
 from support.ros_fixtures import RosRun, hear
 from support.rovers import LSR1
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 SLOPE = 0.3
 BEGIN = 1_700_000_000.0
@@ -75,30 +76,20 @@ class Rover(Node):
 
 
 def drive(node: ground_learner.GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
-    """Send rows; the last of each few is sent again if it is lost on the way."""
+    """Send rows; the last of each few is sent until it has arrived."""
     for begin in range(0, len(rows), AT_ONCE):
-        some = rows[begin : begin + AT_ONCE]
-        for row in some[:-1]:
+        *others, last = rows[begin : begin + AT_ONCE]
+        for row in others:
             rover.send(row)
-        sent = 0.0
-
-        def arrives(row: np.ndarray = some[-1]) -> bool:
-            nonlocal sent
-            if node.heard_until > BEGIN + row[TIME] - 0.05:
-                return True
-            if time.monotonic() > sent + 0.5:
-                rover.send(row)
-                sent = time.monotonic()
-            return False
-
-        wait_until(arrives, "the odometry")
+        until = BEGIN + last[TIME] - 0.05
+        repeat_until(partial(rover.send, last), lambda t=until: node.heard_until > t, "odometry")
 
 
 def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place_marked(ros):
     node = ros.start(ground_learner.GroundLearnerNode, stop_when_stuck=True, mark_when_stuck=True)
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
-    ground = ramp(SLOPE)
+    ground = plane(SLOPE, 0.0, half=3.0)
     ground = replace(ground, ground_class=np.full(ground.elevation.shape, 7.0))
     rover.map.publish(terrain_to_point_cloud(ground, "map", ns_to_stamp(int(BEGIN * 1e9))))
     wait_until(lambda: node.learner is not None, "the map")
@@ -138,13 +129,8 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
 
 
 def test_steering_and_imu_are_read_as_the_parameters_say(ros):
-    upside_down = (np.pi, 0.0, 0.0)
-    ros.start(
-        ground_learner.GroundLearnerNode,
-        steering_sign="right",
-        imu_frame="imu_link",
-        imu_mounting=list(upside_down),
-    )
+    values = {"steering_sign": "right", "imu_frame": "imu_link", "imu_mounting": [np.pi, 0.0, 0.0]}
+    ros.start(ground_learner.GroundLearnerNode, **values)
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     speed, yaw_rate = 0.05, 0.06
@@ -156,7 +142,7 @@ def test_steering_and_imu_are_read_as_the_parameters_say(ros):
         rover.senders["joint_states"].publish(joints)
         stamp = ns_to_stamp(round(time_now * 1e9))
         rates = np.array([0.0, 0.0, -yaw_rate])
-        rover.send_imu(xyzw_from_rpy(*upside_down), rates, stamp, "imu_link")
+        rover.send_imu(xyzw_from_rpy(*values["imu_mounting"]), rates, stamp, "imu_link")
         rover.send_imu(xyzw_from_rpy(0.0, 0.0, 0.0), rates, stamp, "camera")
     wait_until(lambda: rover.wheels, "the odometry of the wheels")
     twist = rover.wheels[-1].twist.twist

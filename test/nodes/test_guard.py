@@ -5,19 +5,18 @@ import threading
 import time
 
 import pytest
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
-from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_planner.ros.guard import Guard, GuardedExecutor, Handover
 from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
+from rover_planner.ros.polled_topics import PolledTopics
+from rover_planner.ros.qos import topic_qos
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
@@ -101,26 +100,19 @@ class CountingExecutor(GuardedExecutor):
 def test_a_message_that_is_left_alone_ends_no_wait(ros):
     node = Fragile(ros.context)
     node.timer.cancel()
-
-    class Unread(MutuallyExclusiveCallbackGroup):
-        def can_execute(self, entity):
-            return not isinstance(entity, Subscription) and super().can_execute(entity)
-
-    events = SubscriptionEventCallbacks(incompatible_qos=node.heard.append)
-    node.create_subscription(
-        String, "maps", node.heard.append, 10, callback_group=Unread(), event_callbacks=events
-    )
+    heard = []
+    PolledTopics(node, node.guard).subscribe(String, "news", heard.append, topic_qos())
     speaker = ros.spin(Node("speaker", context=ros.context))
-    maps = speaker.create_publisher(String, "maps", 10)
-    wait_until(lambda: maps.get_subscription_count() > 0, "the subscription")
-    maps.publish(String(data="large"))
-    assert maps.wait_for_all_acked(Duration(seconds=20.0))
+    news = speaker.create_publisher(String, "news", topic_qos())
+    wait_until(lambda: news.get_subscription_count() > 0, "the subscription")
+    news.publish(String(data="later"))
+    assert news.wait_for_all_acked(Duration(seconds=20.0))
     executor = CountingExecutor(context=ros.context)
     executor.add_node(node)
     end = time.monotonic() + 2.5
     while time.monotonic() < end:
         executor.spin_once(0.5)
-    assert not node.heard and 5 <= executor.wait_sets <= 25
+    assert not heard and 5 <= executor.wait_sets <= 25
     executor.shutdown()
     node.destroy_node()
 

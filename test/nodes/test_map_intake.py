@@ -8,12 +8,11 @@ from builtin_interfaces.msg import Time
 from rclpy.serialization import serialize_message
 
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
-from rover_physics.traction.map_contacts import MapContactFinder
+from rover_physics import Terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.map_intake import MapIntake, are_gridded_alike
-from support.rough_grounds import plane
-from support.rovers import LSR1
+from support.grounds import plane
 from support.waiting import wait_until
 
 FRAMES = Frames(TraverseServerParameters(), lambda: 0)
@@ -29,13 +28,13 @@ class Intake(MapIntake):
 
     def __init__(self):
         self.errors: list[str] = []
-        self.made: list[MapContactFinder] = []
+        self.made: list[Terrain] = []
         self.renewed: list[Any] = []
         logger = SimpleNamespace(error=self.errors.append)
         super().__init__(logger, FRAMES)
 
     def prepare(self, message, source):
-        self.made.append(MapContactFinder(LSR1, terrain_from_point_cloud(message)))
+        self.made.append(terrain_from_point_cloud(message))
 
     def renew(self, cloud):
         self.renewed.append(cloud)
@@ -53,7 +52,7 @@ def test_a_map_is_prepared_once_and_again_where_it_or_a_parameter_changes():
     assert intake.renewed[0].header.stamp.sec == 5
     intake.offer(cloud_of(2.0))
     intake.wait_for(2)
-    first, second = (one.terrain.elevation.shape for one in intake.made)
+    first, second = (one.elevation.shape for one in intake.made)
     assert second > first
     before = TraverseServerParameters()
     assert are_gridded_alike(before, TraverseServerParameters(friction=0.5))

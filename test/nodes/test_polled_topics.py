@@ -5,12 +5,11 @@ import itertools
 import time
 
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import joints_qos, topic_qos
+from rover_planner.ros.qos import topic_qos
 from support.waiting import wait_until
 
 NAMES, WORDS = ("questions", "answers"), ["bad", "good", "better", "best"]
@@ -53,19 +52,3 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     due.append(True)
     topics.poll()
     assert heard[-1][0] == "later"
-
-
-def test_a_fast_publisher_of_joint_states_does_not_push_out_a_slow_one(ros):
-    """A rover's suspension at 50 Hz beside its wheels at 500 Hz."""
-    node, speaker = (ros.spin(Node(name, context=ros.context)) for name in ("hearer", "speaker"))
-    topics, heard = PolledTopics(node, Guard(node.get_logger())), set()
-    topics.subscribe(JointState, "joints", lambda one, _: heard.update(one.name), joints_qos(0.1))
-    slow, fast = (speaker.create_publisher(JointState, "joints", topic_qos()) for _ in range(2))
-    for publisher in (slow, fast):
-        wait_until(publisher.get_subscription_count, "the subscription")
-    slow.publish(JointState(name=["rocker"]))
-    for _ in range(round(0.1 * 500.0)):
-        fast.publish(JointState(name=["wheel"]))
-    time.sleep(0.3)  # all have come
-    topics.poll()
-    assert heard == {"rocker", "wheel"}

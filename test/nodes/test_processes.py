@@ -74,6 +74,11 @@ def test_a_thread_that_ends_while_threads_take_priority_is_no_refusal(tmp_path, 
     assert take_priority(3, [os.getpid()]) == ""
 
 
+def test_zero_asks_for_nothing_and_what_no_system_grants_is_told():
+    assert take_priority(0) == ""
+    assert "realtime_priority 1000" in take_priority(1000)
+
+
 @pytest.mark.long
 def test_a_server_starts_on_a_full_disk_without_a_log_file_and_says_so(start_process):
     process = start_process("traverse_server", preexec_fn=fill_disk)
@@ -117,8 +122,3 @@ def test_a_program_waits_for_no_shared_memory_no_huge_pages_and_no_processor():
     for reason, taken in zip(told[::2], told[1::2], strict=True):
         assert taken == "True" if reason == "" else "CAP_SYS_NICE" in reason
     assert "THP_enabled:\\t0" in pages
-
-
-def test_zero_asks_for_nothing_and_what_no_system_grants_is_told():
-    assert take_priority(0) == ""
-    assert "realtime_priority 1000" in take_priority(1000)

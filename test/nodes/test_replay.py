@@ -29,7 +29,9 @@ from rover_planner.nodes.result_topics import RESULTS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_files import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
 from support.command_line import assert_refused
+from support.grounds import make_terrain
 from support.messages import grid_map_of, odometry_at, transform_message
+from support.paths import poses_at
 from support.rovers import LSR1
 
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
@@ -38,20 +40,15 @@ BEGIN = 1_700_000_000_000_000_000
 GRID_MAPS = "/elevation_map"
 NOT_ON_PYPI = {GRID_MAPS: GRID_MAP, **dict.fromkeys(("/tf", "/tf_static"), TF_MESSAGE)}
 """Types of messages that are objects with their fields, by topic."""
+WAVES = make_terrain(lambda x, y: 0.03 * np.sin(4.0 * x + 0.8 * y), 0.04)
+"""Ground that turns the suspension."""
 STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
-
-
-def waves() -> Terrain:
-    """Return ground 10 m x 4 m with waves that turn the suspension."""
-    X, Y = np.meshgrid(np.arange(-1.0, 9.0, 0.04), np.arange(-2.0, 2.0, 0.04))
-    return Terrain(0.03 * np.sin(4.0 * X + 0.8 * Y), 0.04, (-1.0, -2.0))
 
 
 def drive(length: float) -> list[tuple[str, object]]:
     """Return the messages of a drive along x: odometry and the model's suspension each 2 cm."""
     x = np.arange(0.5, 0.5 + length, 0.02)
-    poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
-    prediction = judge_path(LSR1, waves(), poses)[0]
+    prediction = judge_path(LSR1, WAVES, poses_at(x))[0]
     messages: list[tuple[str, object]] = []
     for k, place in enumerate(x.tolist()):
         values = np.concatenate([prediction.rocker_angle[k], prediction.bogie_angle[k]])
@@ -111,10 +108,9 @@ def published(out: Path, name: str, kind: type) -> list[tuple[int, Any]]:
 def test_a_drive_is_judged_in_stretches_and_answers_are_recorded_as_a_server_publishes_them(
     storage, tmp_path, capsys
 ):
-    seen, name = cloud(waves()), "/elevation_cloud"
+    seen, name = cloud(WAVES), "/elevation_cloud"
     if storage == "sqlite":
-        ground = waves()
-        seen, name = grid_map_of({"elevation": ground.elevation}, 0.04, (3.98, -0.02)), GRID_MAPS
+        seen, name = grid_map_of({"elevation": WAVES.elevation}, 0.04), GRID_MAPS
     messages = [(name, seen), *drive(1.6), ("/traverse_server/path", path_to(2.0))]
     bag = record(tmp_path / "bag", messages, storage)
     answers, total = replay(capsys, bag, tmp_path / "out", "--stretch", "1")
@@ -143,11 +139,11 @@ def test_a_drive_is_judged_in_stretches_and_answers_are_recorded_as_a_server_pub
 
 
 def test_each_new_map_is_asked_for_a_goal_from_the_odometry_and_not_for_a_path(tmp_path, capsys):
-    flat = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
+    flat = make_terrain(lambda x, y: 0.0 * x)
     messages = [
         ("/odometry", odometry_at((1.0, 0.0, 0.0))),
-        ("/elevation_cloud", cloud(waves())),
-        ("/elevation_cloud", cloud(waves())),  # the same again
+        ("/elevation_cloud", cloud(WAVES)),
+        ("/elevation_cloud", cloud(WAVES)),  # the same again
         ("/traverse_server/path", path_to(2.0)),
         ("/elevation_cloud", cloud(flat, BEGIN + 1)),
     ]
@@ -164,8 +160,8 @@ def test_each_new_map_is_asked_for_a_goal_from_the_odometry_and_not_for_a_path(t
 
 def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
     messages = [
-        ("/elevation_cloud", cloud(waves(), frame="odom")),
-        ("/elevation_cloud", cloud(waves())),
+        ("/elevation_cloud", cloud(WAVES, frame="odom")),
+        ("/elevation_cloud", cloud(WAVES)),
         ("/odometry", odometry_at((1.0, 0.0, 0.0), frame="odom")),
         ("/joint_states", JointState(name=["bogie_left"], position=[float("nan")])),
         ("/imu", Imu(orientation=Quaternion(w=0.0))),
@@ -187,9 +183,9 @@ NO_TOPIC = f"no topic /c of type sensor_msgs/msg/PointCloud2 or {GRID_MAP} in th
     ("messages", "words", "said"),
     [
         ([("/odometry", odometry_at((0.0, 0.0, 0.0)))], (), "has no map: PointCloud2 or GridMap"),
-        ([("/a", cloud(waves())), ("/b", cloud(waves()))], (), "choose one by --map-topic"),
-        ([("/a", cloud(waves()))], ("--map-topic", "/c"), NO_TOPIC),
-        ([("/a", cloud(waves()))], ("--parameters", "none.yaml"), "none.yaml"),
+        ([("/a", cloud(WAVES)), ("/b", cloud(WAVES))], (), "choose one by --map-topic"),
+        ([("/a", cloud(WAVES))], ("--map-topic", "/c"), NO_TOPIC),
+        ([("/a", cloud(WAVES))], ("--parameters", "none.yaml"), "none.yaml"),
     ],
 )
 def test_bad_input_is_one_line_and_makes_nothing(messages, words, said, tmp_path, capfd):
@@ -203,7 +199,7 @@ def test_what_is_no_bag_and_a_damaged_one_are_refused(tmp_path, capfd):
     for bag in (tmp_path / "empty", tmp_path / "none", Path(__file__)):
         code = main(["replay", str(bag), str(tmp_path / "out")])
         assert_refused(capfd, code, "is no bag that can be read")
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(1.0)])
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(WAVES)), *drive(1.0)])
     (file,) = bag.glob("*.mcap")
     content = bytearray(file.read_bytes())
     content[len(content) // 3 :] = b"\x00" * (len(content) - len(content) // 3)
@@ -218,7 +214,7 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     in_odom, in_camera = map_odom.inverse().then(on_map), on_map.then(mount).inverse()
     odometry = odometry_at(in_odom.xyyaw, in_odom.translation[2], "odom")
     odometry.header.stamp = ns_to_stamp(BEGIN)
-    plain, seen = cloud(waves()), cloud(waves(), frame="camera")
+    plain, seen = cloud(WAVES), cloud(WAVES, frame="camera")
     points = np.frombuffer(plain.data, "<f4").reshape(-1, 3)
     moved = in_camera.rotation.apply(points) + in_camera.translation
     seen.data = moved.astype("<f4").tobytes()
@@ -232,9 +228,9 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     words = ["--resolution", "0.04", "--goal", "3,0.2,0"]
     (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
     assert total["refused_messages"] == {} and total["topics"]["tf"] == "/tf"
-    ground, right = load_terrain(tmp_path / "out" / answer["map"]), waves()
+    ground = load_terrain(tmp_path / "out" / answer["map"])
     x, y = np.meshgrid(np.arange(0.0, 4.0, 0.1), np.arange(-1.0, 1.0, 0.1))
-    np.testing.assert_allclose(ground.elevation_at(x, y), right.elevation_at(x, y), atol=2e-3)
+    np.testing.assert_allclose(ground.elevation_at(x, y), WAVES.elevation_at(x, y), atol=2e-3)
     poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
     np.testing.assert_allclose(poses[0], [1.0, 0.0, 0.0], atol=1e-6)
 
@@ -242,7 +238,7 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
 def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_joints(
     tmp_path, capsys
 ):
-    messages = [("/elevation_cloud", cloud(waves())), ("/traverse_server/path", path_to(2.0))]
+    messages = [("/elevation_cloud", cloud(WAVES)), ("/traverse_server/path", path_to(2.0))]
     bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
     file.write_text(
         "/**: {ros__parameters: {base_offset: [0.2, 0.1, 0.3, 0.0, 0.0, 0.0], "
@@ -265,7 +261,7 @@ def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_join
 def test_what_lacks_to_ask_a_question_is_told_and_an_answer_is_never_written_over(
     tmp_path, capsys
 ):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(WAVES))])
     for words, code, said in (
         (["nothing"], 0, "nothing was asked: the bag has no path and no odometry; give --goal"),
         (["goal", "--goal=2,0,0"], 0, "no odometry before them tells where it starts"),

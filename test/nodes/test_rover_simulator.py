@@ -135,7 +135,6 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     assert controller.statistics.updates > 20 and controller.statistics.fallbacks == 0
     last = server.service.terrain
     assert np.isfinite(last.elevation).sum() > np.isfinite(first.elevation).sum()
-    assert all(ros.is_alive(node) for node in (simulator, server, controller))
 
 
 def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(

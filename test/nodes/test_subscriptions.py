@@ -71,10 +71,7 @@ def test_a_best_effort_publisher_is_named_with_the_parameter_that_mends_it(adver
     advertise(BEST_EFFORT)
     text = "a publisher of maps is not heard: its reliability does not match; "
     text += "set input_reliability to best_effort"
-    told = []
-
-    def is_told() -> bool:
-        told.append(capfd.readouterr().err)
-        return text in "".join(told)
-
-    wait_until(is_told, "the warning")
+    told: list[str] = []
+    repeat_until(
+        lambda: told.append(capfd.readouterr().err), lambda: text in "".join(told), "the warning"
+    )

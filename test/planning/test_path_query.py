@@ -6,17 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_planner.planning import path_query
+from rover_planner.planning.path_query import PathQueryOptions, choose
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.site import Site
 from support.grounds import make_terrain
 from support.rovers import LSR1
 
-COARSE = path_query.PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
+COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
 FLAT = make_terrain(lambda x, y: 0.0 * x)
 
 
 def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
     terrain = make_terrain(lambda x, y: np.where(np.abs(x - 1) < 0.3, 1.0, 0.0))
-    answer = path_query.answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
+    answer = PathJudge(Site(LSR1, terrain, COARSE)).search((-3, 0, 0), (3, 0, 0))
     assert not answer.traversable
     assert answer.chosen.verdict.reason
     assert answer.chosen.verdict.reason in answer.explain()
@@ -28,25 +30,21 @@ def test_turns_on_the_spot_before_a_failure_are_no_distance():
     turn = np.column_stack([np.zeros((60, 2)), np.linspace(-1.0, 0.0, 60)])
     drive = np.column_stack([np.linspace(0.0, 2.0, 60), np.zeros((60, 2))])
     wall = make_terrain(lambda x, y: np.where(x > 1.3, 1.0, 0.0))
-    refused = path_query.check_path(LSR1, wall, np.concatenate([turn, drive]))
-    assert refused.passable_length == pytest.approx(
-        drive[refused.verdict.first_failure - 60, 0], abs=1e-9
-    )
+    refused = PathJudge(Site(LSR1, wall)).check(np.concatenate([turn, drive]))
+    failure = drive[refused.verdict.first_failure - 60]
+    assert refused.passable_length == pytest.approx(failure[0], abs=1e-9)
 
 
 def test_the_safer_path_wins_and_energy_decides_between_equals():
-    answer = path_query.answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
+    answer = PathJudge(Site(LSR1, FLAT, COARSE)).search((-2, 0, 0), (2, 0, 0))
     assert answer.choice == 0 and "5 of 5" in answer.explain()  # straight ahead
-    risky, safe, thrifty = (
-        replace(
-            one,
-            prediction=one.prediction.change(energy=np.full(len(one.poses), energy)),
-            verdict=replace(one.verdict, risk=risk),
-        )
-        for one, risk, energy in zip(
-            answer.candidates, (0.5, 0.3, 0.31), (10.0, 90.0, 80.0), strict=False
-        )
-    )
-    assert path_query.choose((risky, safe, thrifty)).choice == 2
+
+    def change(one, risk, energy):
+        prediction = one.prediction.change(energy=np.full(len(one.poses), energy))
+        return replace(one, prediction=prediction, verdict=replace(one.verdict, risk=risk))
+
+    values = zip(answer.candidates, (0.5, 0.3, 0.31), (10.0, 90.0, 80.0), strict=False)
+    risky, safe, thrifty = (change(*one) for one in values)
+    assert choose((risky, safe, thrifty)).choice == 2
     refused = replace(thrifty, verdict=replace(thrifty.verdict, traversable=False))
-    assert path_query.choose((risky, safe, refused)).choice == 1
+    assert choose((risky, safe, refused)).choice == 1

@@ -10,11 +10,11 @@ from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
-from support.rough_grounds import bouldered, enlarged, rocky
+from support.grounds import bouldered, enlarged, rocky, scaled_for
 from support.rovers import LSR1, M2020, SIMILAR, similar
 from support.services import load_settings
 
-START, GOAL = np.array([-2.0, -1.5, 0.3]), np.array([1.8, 1.6, 0.8])
+ENDS = np.array([[-2.0, -1.5, 0.3], [1.8, 1.6, 0.8]])
 SURE = PathQueryOptions(accepted_chance=1.0)
 FIRST = LatticeSettings(budget=200.0, ends_at_first=True)
 
@@ -23,16 +23,12 @@ def plan(rover: Rover, seed: int):
     """Yield what is told of a search and of candidates, without units."""
     size = rover.wheel.radius / LSR1.wheel.radius
     units = [size, size, 1.0]
-    found = find_path(
-        SearchQuery(
-            Site(rover, enlarged(bouldered(seed), size), SURE), START * units, GOAL * units
-        ),
-        FIRST,
-    )
+    ground, ends = scaled_for(rover, bouldered(seed), ENDS)
+    found = find_path(SearchQuery(Site(rover, ground, SURE), *ends), FIRST)
     yield found.outcome, found.expanded, found.edges_judged, found.cost / size
     yield None if found.path is None else found.path.poses / units
     judge = PathJudge(Site(rover, enlarged(rocky(seed), size), SURE))
-    answer = judge.search(START * units, GOAL * units, 0.35 * size)
+    answer = judge.search(*ends, 0.35 * size)
     yield answer.choice, answer.alternatives_tried, answer.goal_offset / size
     for candidate in answer.candidates:
         yield candidate.verdict.codes

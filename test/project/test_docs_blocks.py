@@ -25,7 +25,7 @@ LONGEST, GRACE = 300.0, 20.0
 """Longest time for a block, and for its processes to end after it [s]."""
 
 PAGES = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
-BLOCKS = [block for page in PAGES for block in read_blocks(page)]
+BLOCKS = {page.relative_to(TOP).as_posix(): read_blocks(page) for page in PAGES}
 
 
 def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
@@ -89,7 +89,7 @@ def run_block(block: Block, folder: Path, programs: Path, token: ProcessToken) -
             timeout=LONGEST, start_new_session=True,
         )  # fmt: skip
     left = token.wait_until_gone(GRACE)
-    said = f"{block.page}: {block.text}\n{out.read_text()}\n{err.read_text()}"
+    said = f"{block.text}\n{out.read_text()}\n{err.read_text()}"
     assert ended.returncode == 0, said
     assert "Traceback" not in said and "[FATAL]" not in said, said
     assert not left, f"processes are left by {said}"
@@ -106,12 +106,13 @@ def lines_of(text: str) -> list[str]:
     "page",
     [
         pytest.param(page, marks=[] if page == "README.md" else [pytest.mark.long])
-        for page in dict.fromkeys(block.page for block in BLOCKS)
+        for page, blocks in BLOCKS.items()
+        if blocks
     ],
 )
 def test_the_blocks_of_a_page_run_as_written(page, tmp_path, programs, token):
     folder = tmp_path / "work"
     folder.mkdir()
-    for block in BLOCKS:
-        if block.page == page and not block.not_run:
+    for block in BLOCKS[page]:
+        if not block.not_run:
             run_block(block, folder, programs, token)

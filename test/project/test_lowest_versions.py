@@ -12,8 +12,8 @@ from support.project.checkout import TOP, copy_checkout, setup_arguments
 
 LIBRARY = """
 import numpy as np
-from rover_physics import SweepOptions, classify_path, find_torque_ranges, judge_path
-from rover_physics import judge_reach, load_rover, load_terrain, score_poses
+from rover_physics import SweepOptions, judge_path, judge_reach, load_rover, load_terrain
+from rover_physics import score_poses
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
@@ -24,8 +24,6 @@ for policy in ("equal", "optimal"):
     prediction, verdict = judge_path(rover, ground, poses, SweepOptions(policy=policy))
     assert verdict.traversable and prediction.settled.all(), verdict.reason
 assert score_poses(rover, ground, poses).passable.all()
-assert len(classify_path(rover, ground, poses)) == 2
-assert (find_torque_ranges(rover, ground, poses).lowest < 0.0).all()
 assert not judge_reach(rover, ground, poses[0], (-40.0, -19.5, -2.0)).possible
 level = MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.zeros(6))
 inputs = ProgramInputs(np.full(6, 0.8), rover.wheel.max_torque, rover.wheel.radius)

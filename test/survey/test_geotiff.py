@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
 
+import shutil
 import tracemalloc
 
 import numpy as np
@@ -16,11 +17,7 @@ from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.survey import prepare_survey
 from rover_planner.viewer.state.survey_layers import load_map
 from support.command_line import assert_refused
-from support.survey_maps import (
-    compute_here,
-    make_request,
-    make_rough_map,
-)
+from support.survey_maps import compute_here, make_request, make_rough_map
 
 rasterio = pytest.importorskip("rasterio", reason="install the extra survey")
 
@@ -33,8 +30,8 @@ MARS = (
 LEFT, TOP, CELL = 812_345.5, -245_678.25, 0.1
 
 
-def write_tif(path, heights, **changes):
-    """Write heights with row 0 in the north."""
+def write_tif(path, heights, notes=None, **changes):
+    """Write heights with row 0 in the north, and notes on its bands, such as their scales."""
     heights = np.asarray(heights)
     bands = heights if heights.ndim == 3 else heights[None]
     profile = {
@@ -49,13 +46,10 @@ def write_tif(path, heights, **changes):
         "blockxsize": 64,
         "blockysize": 64,
     } | changes
-    unit, scale = profile.pop("unit", None), profile.pop("scale", None)
     with rasterio.open(path, "w", **profile) as file:
         file.write(bands)
-        if unit:
-            file.units = [unit] * len(bands)
-        if scale is not None:
-            file.scales = [scale] * len(bands)
+        for name, values in (notes or {}).items():
+            setattr(file, name, values)
     return path
 
 
@@ -89,12 +83,23 @@ def test_overviews_have_values_of_the_layer(tmp_path, kind):
 def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
     values = np.full((30, 40), 1234, np.int16)
     values[3, 5], values[7, 9] = -9999, 1300
-    path = write_tif(tmp_path / "map.tif", values, nodata=-9999)
-    with rasterio.open(path, "r+") as file:
-        file.scales, file.offsets = [0.01], [100.0]
+    notes = {"scales": [0.01], "offsets": [100.0]}
+    path = write_tif(tmp_path / "map.tif", values, notes, nodata=-9999)
     heights = GeoTiffMap(path).read((slice(0, 30), slice(0, 40)))["elevation"]
     assert np.isnan(heights[26, 5]) and np.isnan(heights).sum() == 1
     assert heights[22, 9] == pytest.approx(113.0) and heights[0, 0] == pytest.approx(112.34)
+
+
+def test_cells_of_a_mask_and_of_a_nodata_value_are_unknown(tmp_path):
+    heights = np.ones((30, 40), np.float32)
+    heights[3, 5] = -9999.9
+    mask = np.full(heights.shape, 255, np.uint8)
+    mask[7, 9] = 0
+    path = write_tif(tmp_path / "map.tif", heights, nodata=-9999.9)
+    with rasterio.open(path, "r+") as file:
+        file.write_mask(mask)
+    found = GeoTiffMap(path).read((slice(0, 30), slice(0, 40)))["elevation"][::-1]
+    assert np.argwhere(np.isnan(found)).tolist() == [[3, 5], [7, 9]]
 
 
 @pytest.mark.filterwarnings("ignore:The given matrix is equal to Affine.identity")
@@ -105,22 +110,24 @@ def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
         ({"transform": rasterio.Affine.identity()}, "says nowhere where its cells are"),
         ({"crs": "EPSG:4326"}, "is in degrees; it must be in a map projection in metres"),
         ({"crs": "EPSG:2263"}, "has coordinates in US survey foot"),
+        # Of this one PROJ itself wrote a second line on stderr.
+        ({"crs": "+proj=stere +lat_0=-90 +R=1737400 +units=km"}, "has coordinates in kilometre"),
         ({"crs": None}, "has no coordinate reference system"),
         ({"crs": 'LOCAL_CS["site",UNIT["metre",1]]'}, "is in coordinates of another kind"),
-        ({"scale": 0.0}, "has heights with scale 0 and offset 0"),
-        ({"unit": "ft"}, "has heights in 'ft'; they must be in metres"),
+        ({"notes": {"scales": [0.0]}}, "has heights with scale 0 and offset 0"),
+        ({"notes": {"units": ["ft"]}}, "has heights in 'ft'; they must be in metres"),
         ({"transform": rasterio.Affine.rotation(10) @ rasterio.Affine.scale(0.1, -0.1)},
          "is rotated or mirrored"),
         ({"transform": rasterio.Affine(0.1, 0, 0, 0, 0.1, 0)}, "is rotated or mirrored"),
         ({"transform": rasterio.Affine(0.1, 0, 0, 0, -0.2, 0)}, "has cells of 0.1 x 0.2 m"),
     ],
 )  # fmt: skip
-def test_a_tif_of_another_kind_is_refused_with_a_hint(tmp_path, changes, said):
+def test_a_tif_of_another_kind_is_refused_in_one_line_with_a_hint(tmp_path, capfd, changes, said):
     changes = {"heights": np.zeros((40, 50), np.float32)} | changes
     path = write_tif(tmp_path / "map.tif", **changes)
-    with pytest.raises(PlanningError) as refusal:
-        prepare_survey(make_request(), str(path), tmp_path / "out")
-    assert said in str(refusal.value) and str(path) in str(refusal.value)
+    capfd.readouterr()
+    code = main(["survey", "lsr1", str(path), str(tmp_path / "out")])
+    assert_refused(capfd, code, f"map.tif: {said}")
     assert not (tmp_path / "out").exists()
 
 
@@ -142,15 +149,6 @@ def test_heights_that_no_ground_has_are_refused_by_file_and_value(tmp_path, valu
     if nodata is None:
         advised = float(str(refusal.value).split("-a_nodata")[1].split()[0])
         assert advised == value  # as GDAL compares it with the heights
-
-
-def test_a_projection_in_kilometres_is_refused_in_one_line(tmp_path, capfd):
-    """PROJ itself wrote a second line on stderr."""
-    kilometres = "+proj=stere +lat_0=-90 +R=1737400 +units=km"
-    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50), np.float32), crs=kilometres)
-    capfd.readouterr()
-    code = main(["survey", "lsr1", str(path), str(tmp_path / "out")])
-    assert_refused(capfd, code, "has coordinates in kilometre")
 
 
 @pytest.mark.parametrize(
@@ -221,6 +219,18 @@ def test_the_page_gets_the_map_that_was_surveyed_and_not_one_that_has_changed(tm
     write_tif(path, heights[::-1] + 1, nodata=np.nan)
     with pytest.raises(PlanningError, match=r"map\.tif has changed since .*out was made"):
         load_map(tmp_path / "out", 10_000)
+
+
+def test_a_survey_goes_on_only_with_the_map_that_it_will_read(tmp_path):
+    heights = make_rough_map(20, 30).elevation.astype(np.float32)
+    first, moved = tmp_path / "map.tif", tmp_path / "moved.tif"
+    write_tif(first, heights, nodata=np.nan)
+    prepare_survey(make_request(), str(first), tmp_path / "out")
+    shutil.copy(first, moved)
+    assert prepare_survey(make_request(), str(moved), tmp_path / "out").chunks
+    write_tif(first, heights + 1, nodata=np.nan)
+    with pytest.raises(PlanningError, match=r"map\.tif has changed since .*out was made"):
+        prepare_survey(make_request(), str(moved), tmp_path / "out")
 
 
 def test_a_damaged_block_is_refused_in_words_of_its_own(tmp_path):

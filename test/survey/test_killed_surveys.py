@@ -20,7 +20,6 @@ from rover_planner.survey.survey import prepare_survey
 from support.project.checkout import TOP
 from support.survey_maps import (
     assert_same_bits,
-    count_chunks,
     die_on_one,
     layers_of,
     make_request,
@@ -60,7 +59,7 @@ def start(module, *words) -> subprocess.Popen:
 
 
 def wait_for_a_chunk(out: Path) -> None:
-    wait_until(lambda: count_chunks(out) >= 1, "a chunk", 300.0)
+    wait_until(lambda: out.exists() and SurveyStore(out).find_finished(), "a chunk", 300.0)
 
 
 def children_of(pid) -> list[int]:
@@ -93,7 +92,7 @@ def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_p
         assert (process.returncode, err) == (130, "")
     for worker in workers:
         wait_until_gone(worker, 60.0)
-    done = count_chunks(out)
+    done = len(SurveyStore(out).find_finished())
     assert 1 <= done < 9
     again = start(*words)
     printed, err = again.communicate(timeout=200)

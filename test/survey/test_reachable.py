@@ -144,32 +144,27 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
         find_reachable(store, 3.0, 2.0)
 
 
-def test_a_start_where_the_rover_cannot_stand_says_why_and_is_drawn(tmp_path, capfd):
+def test_a_start_where_the_rover_cannot_stand_says_why_and_is_drawn_and_one_off_the_map_is_refused(
+    tmp_path, capfd
+):
     elevation = np.zeros((60, 60))
     elevation[:, 30:] += 2.0 * 0.1 * np.arange(30)  # 63 degrees
-    store = survey_here(tmp_path, Terrain(elevation, 0.1), make_request()).store
+    ground = Terrain(elevation, 0.1, (500_000.05, 4_999_993.05))  # as of a projection
+    store = survey_here(tmp_path, ground, make_request()).store
     codes = json.loads((store.path / "zarr.json").read_text())["attributes"][NOTES]["limits"]
     first = codes[str(int(store.layer("first_limit")[30, 45]))]
     picture = tmp_path / "area.png"
     words = ["reachable", str(store.path), "--picture", str(picture), "--from"]
-    assert main([*words, "4.5,3"]) == 0 and picture.stat().st_size > 1000
+    assert main([*words, "500004.55,4999996.05"]) == 0 and picture.stat().st_size > 1000
     report = json.loads(capfd.readouterr().out)
     assert report["cells"] == 0 and first
     assert report["reason"] == f"no heading is passable at the start: {first}"
-    assert main([*words, "1.5,3"]) == 0
+    assert main([*words, "500001.55,4999996.05"]) == 0
     report = json.loads(capfd.readouterr().out)
     assert report["cells"] > 0 and report["reason"] == ""
-
-
-def test_places_in_the_coordinates_of_a_projection_are_told_to_a_millimetre(tmp_path):
-    ground = Terrain(np.zeros((40, 40)), 0.1, (500_000.05, 4_999_993.05))
-    store = survey_here(tmp_path, ground, make_request(step=4)).store
-    with pytest.raises(PlanningError) as refusal:
+    told = "x 500000.05 to 500005.95, y 4999993.05 to 4999998.95"
+    with pytest.raises(PlanningError, match=rf"\(500000.123, 0\) is off the map.* within {told}"):
         find_reachable(store, 500_000.123, 0.0)
-    assert (
-        "from (500000.123, 0) is off the map; it must be within x 500000.05 to 500003.65, "
-        "y 4999993.05 to 4999996.65" in str(refusal.value)
-    )
 
 
 def test_a_place_that_is_none_is_one_line_and_exit_code_2(capfd):

@@ -22,7 +22,6 @@ from support.rovers import LSR1, M2020
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
-    count_chunks,
     layers_of,
     make_request,
     make_rough_map,
@@ -89,15 +88,18 @@ def test_a_store_of_another_survey_is_refused(files, changes, said):
     assert said in str(refusal.value)
 
 
-def test_a_store_of_another_map_or_version_is_refused(files, monkeypatch):
-    prepare(files)
+def test_a_store_of_another_map_of_other_gaps_or_of_another_version_is_refused(files, monkeypatch):
+    store, box = prepare(files, max_gap=0.3).store, (slice(0, 70), slice(0, 70))
+    assert not np.isnan(store.open_map().read(box)["elevation"]).any()
+    with pytest.raises(PlanningError, match="another map"):
+        prepare(files)
     monkeypatch.setattr("rover_physics.__version__", "99.0")
     with pytest.raises(PlanningError, match="another version: .*, not 99.0"):
-        prepare(files)
+        prepare(files, max_gap=0.3)
     monkeypatch.undo()
     save_terrain(files / "map.npz", raised(make_rough_map(70, 70), (5, 5), 1e-9))
     with pytest.raises(PlanningError, match="another map"):
-        prepare(files)
+        prepare(files, max_gap=0.3)
 
 
 def test_other_chunks_are_refused_only_where_they_are_asked_for(files):
@@ -128,23 +130,11 @@ def test_two_commands_do_not_write_into_one_store(files):
         pass
 
 
-def test_filled_gaps_are_another_map(files):
-    store = prepare(files, max_gap=0.3).store
-    box = slice(0, 70), slice(0, 70)
-    assert not np.isnan(store.open_map().read(box)["elevation"]).any()
-    with pytest.raises(PlanningError, match="another map"):
-        prepare(files)
-
-
-def test_a_missing_layer_is_named(files):
-    path = prepare(files).store.path
-    shutil.rmtree(path / "worst_tilt")
-    with pytest.raises(PlanningError, match="worst_tilt is damaged .*survey again"):
-        SurveyStore(path)
-
-
-def test_a_store_of_another_format_is_refused(files):
+def test_a_missing_layer_is_named_and_so_is_another_format(files):
     store = prepare(files).store
+    shutil.rmtree(store.path / "worst_tilt")
+    with pytest.raises(PlanningError, match="worst_tilt is damaged .*survey again"):
+        SurveyStore(store.path)
     store._group.attrs[NOTES] = store._group.attrs[NOTES] | {"format": 1}
     with pytest.raises(PlanningError, match="a survey of format 1; it must be 2: survey again"):
         SurveyStore(store.path)
@@ -172,7 +162,9 @@ def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypa
     forced, fsync = [], os.fsync
 
     def force(number):
-        forced.append((Path(f"/proc/self/fd/{number}").readlink(), count_chunks(path)))
+        forced.append(
+            (Path(f"/proc/self/fd/{number}").readlink(), len(prepared.store.find_finished()))
+        )
         fsync(number)
 
     monkeypatch.setattr(os, "fsync", force)

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("distributed", reason="install the extra survey")
@@ -244,4 +245,11 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
 def test_bad_input_is_one_line_before_a_store_is_made(ground, monkeypatch, words, said, capfd):
     monkeypatch.setattr(dask_cluster, "CONNECT_TIME", 0.5)
     assert_refused(capfd, survey(ground, *words), said)
+    assert not ground.with_name("out").exists()
+
+
+def test_a_policy_without_bounds_is_refused_on_an_uncertain_map(ground, capfd):
+    known = load_terrain(ground)
+    save_terrain(ground, replace(known, elevation_std=0.01 * np.abs(known.elevation)))
+    assert_refused(capfd, survey(ground, "--policy", "servo"), "policy 'servo' has no bounds")
     assert not ground.with_name("out").exists()

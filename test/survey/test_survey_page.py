@@ -11,8 +11,9 @@ pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics import SweepOptions, Terrain, load_rover
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
+from rover_physics.traversability.pose_classes import IMPASSABLE
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
+from rover_planner.survey.layers import CLASS_COLOURS
 from rover_planner.viewer.state.colours import UNKNOWN
 from rover_planner.viewer.state.survey_layers import CLASS, ShownSurvey, load_map
 from support.rovers import LSR1
@@ -45,9 +46,7 @@ def look_at(shown, x, y):
 
 
 def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_there(shown):
-    passable, impassable = (
-        tuple(bytes.fromhex(CLASS_COLOURS[k][1:])) for k in (0, CLASS_NUMBERS["impassable"])
-    )
+    passable, impassable = (tuple(bytes.fromhex(CLASS_COLOURS[k][1:])) for k in (0, IMPASSABLE))
     for place, colour in ((WALL, impassable), (HOLE, UNKNOWN), ((-3.0, 1.0), UNKNOWN)):
         assert look_at(shown, *place)[0] == colour
     found, legend = look_at(shown, *PASSABLE)

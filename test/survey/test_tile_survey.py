@@ -9,9 +9,8 @@ import pytest
 pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics import SweepOptions, Terrain, judge_poses
-from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
+from rover_physics.traversability.pose_classes import IMPASSABLE, RoverOnMap, classify_poses
 from rover_planner.survey.layers import (
-    CLASS_NUMBERS,
     NO_LIMIT,
     list_layers,
     number_limits,
@@ -20,6 +19,7 @@ from rover_planner.survey.layers import (
 )
 from rover_planner.survey.layout import choose_chunk, find_halo
 from rover_planner.survey.tile_survey import outline_of, survey_tile
+from support.grounds import raised
 from support.rovers import LSR1
 from support.survey_maps import (
     assert_same_bits,
@@ -89,7 +89,7 @@ def test_limits_and_classes_are_those_of_predict(ground, policy, std):
     limits = np.array([number_limits()[code] for code in verdict.codes])
     np.testing.assert_array_equal(layers["first_limit"][clear], limits[clear])
     classes = classify_poses(RoverOnMap(TOP_HEAVY, ground, request.options), poses)
-    classes[classes < 0] = CLASS_NUMBERS["impassable"]  # ground that was not seen
+    classes[classes < 0] = IMPASSABLE  # ground that was not seen
     np.testing.assert_array_equal(layers["best_class"][clear], classes[clear])
     assert clear.any() and not clear.all()
     if std is None:
@@ -111,15 +111,11 @@ def test_the_layers_sum_up_the_headings_of_each_cell_and_turns_to_both_sides(gro
     assert not (bits & ~passes).any()
     np.testing.assert_array_equal(layers["best_class"] == 0, bits.any(axis=1))
     np.testing.assert_array_equal(layers["first_limit"] == NO_LIMIT, bits.all(axis=1))
-    tilt = np.arccos(np.cos(prediction.roll) * np.cos(prediction.pitch)).reshape(-1, 4)
-    some = ~np.isnan(tilt).all(axis=1)
-    np.testing.assert_allclose(
-        layers["worst_tilt"][some], np.nanmax(tilt[some], axis=1), rtol=1e-6, atol=1e-7
-    )
-    clearance = prediction.belly_clearance.reshape(-1, 4)[some]
-    np.testing.assert_allclose(
-        layers["worst_belly_clearance"][some], np.nanmin(clearance, axis=1), rtol=1e-6
-    )
+    told = layers["worst_tilt"], -layers["worst_belly_clearance"]
+    values = [one.reshape(-1, 4) for one in (prediction.tilt, -prediction.belly_clearance)]
+    some = ~np.isnan(values[0]).all(axis=1)
+    for worst, each in zip(told, values, strict=True):
+        np.testing.assert_allclose(worst[some], np.nanmax(each[some], axis=1), rtol=1e-6)
     assert np.isnan(layers["worst_tilt"][~some]).all() and (~some).any()
     worst, best = (layers[f"{one}_friction_utilisation"][some] for one in ("worst", "best"))
     assert (worst >= best).all()
@@ -148,9 +144,7 @@ def test_the_chance_of_a_cell_is_that_of_its_headings_and_1_where_one_fails_as_t
 
 def test_no_cell_passes_whose_outline_touches_unknown_ground():
     request = make_request(headings=16)
-    heights = np.zeros((60, 60))
-    heights[30, 30] = np.nan
-    ground = Terrain(heights, 0.05)
+    ground = raised(Terrain(np.zeros((60, 60)), 0.05), (30, 30), np.nan)
     places = places_on(ground, 1)
     passes = unpack_bits(survey_tile(request, ground, places)["passable_headings"], 16)
     rear, front, right, left = outline_of(request.rover)
@@ -170,11 +164,13 @@ def test_no_cell_passes_whose_outline_touches_unknown_ground():
 
 
 def test_ground_that_is_all_unknown_is_impassable():
-    layers = survey_tile(make_request(turns=True), None, np.zeros((5, 2)))
-    assert (layers["best_class"] == CLASS_NUMBERS["impassable"]).all()
+    layers = survey_tile(make_request(turns=True, chance=True), None, np.zeros((5, 2)))
+    assert (layers["best_class"] == IMPASSABLE).all()
     assert (layers["first_limit"] == number_limits()["unknown_ground"]).all()
     assert not layers["passable_headings"].any() and np.isnan(layers["worst_tilt"]).all()
-    listed = list_layers(4, True, False)
+    assert (layers["worst_failure_chance"] == 1.0).all()
+    assert (layers["best_failure_chance"] == 1.0).all()
+    listed = list_layers(4, True, True)
     assert {k: v.dtype for k, v in layers.items()} == {k: v.dtype for k, v in listed.items()}
 
 

@@ -19,7 +19,7 @@ from rover_planner.parameters.traction_controller import (
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.supervisor import TractionSupervisor
-from support.rough_grounds import plane
+from support.grounds import plane
 from support.rovers import LSR1
 
 SPEED, CURVATURE = 0.03, 0.5

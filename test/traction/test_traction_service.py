@@ -13,7 +13,7 @@ from rover_planner.parameters.traction_controller import COAST, TractionControll
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.supervisor import RECOVERY_TIME
 from support.creeping_rover import PERIOD, CreepingRover
-from support.rough_grounds import plane
+from support.grounds import plane
 from support.rovers import FIXED, LSR1
 
 STEERED = steering_joints(LSR1)

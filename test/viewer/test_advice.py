@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.advice.advise import grow_advice
-from rover_planner.advice.case import Case
+from rover_planner.advice.case import case_of
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.viewer.documents.advice import PROMISED, Advised, apply_remedy, describe_advice
 from rover_planner.viewer.pages.page import Page
@@ -20,20 +20,19 @@ ENDS = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 OPTIONS = PathQueryOptions(count=1, waypoint_spacing=0.05)
 
 
-def slope(x, y):
-    return 0.3 * x
-
-
 @pytest.mark.parametrize(
     ("ground", "changes", "levers"),
-    [(slope, {"friction": 0.45}, {"policy", "friction"}), (rock_left, {}, {"shift", "curve"})],
+    [
+        (lambda x, y: 0.3 * x, {"friction": 0.45}, {"policy", "friction"}),
+        (rock_left, {}, {"shift", "curve"}),
+    ],
 )
 def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers):
     rover = replace(LSR1, **changes)
     session = session_on(ground, *ENDS, OPTIONS, rover)
     path, wanted = session.shown.path, session.wanted
     assert not path.verdict.traversable
-    growing = grow_advice(Case(rover, wanted.terrain, path.poses, wanted.options.model))
+    growing = grow_advice(case_of(wanted.site, path.poses))
     found = ((one, {remedy.levers[0].lever.name for remedy in one.found}) for one in growing)
     advice = next(one for one, names in found if names >= levers)
     for remedy in advice.remedies:
@@ -74,8 +73,7 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
 
 def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     path, since = session_on(rock_left, *ENDS, OPTIONS).shown.path, 1000.0
-    asked = path.scenario
-    growing = grow_advice(Case(asked.rover, asked.terrain, path.poses, asked.options.model))
+    growing = grow_advice(case_of(path.scenario.site, path.poses))
     none, some = next(growing), next(one for one in growing if one.remedies)
     first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))
     told = describe_advice(first, True, since + 0.5 * PROMISED)

@@ -37,6 +37,7 @@ def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
     limits, prediction = path.limits, path.prediction
     at, torque = ~limits.rows.is_between, limits.lane("torque")
     np.testing.assert_allclose(limits.lane("belly").values[at], 100.0 * prediction.belly_clearance)
+    assert (limits.lane("belly").bounds == 100.0 * LSR1.limits.belly_clearance).all()
     links = [limits.find_link(torque, row) for row in np.flatnonzero(at)]
     most_torque = prediction.torque_saturation.argmax(axis=1)
     np.testing.assert_array_equal(links, np.array(WHEELS)[most_torque])
@@ -246,18 +247,14 @@ def test_the_joint_that_ends_a_path_is_named_by_its_failure_and_by_the_uses():
 
 @pytest.mark.parametrize("start", [-1.0, 0.4])
 def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played(start):
-    session = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0))
-    path = session.shown.path
+    shown = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0)).shown
+    path = shown.path
     assert path.failure is not None and path.failure.code == "unknown_ground"
     assert path.failure.state.time == path.trajectory.times[-1]
     assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.state.time == 0.0)
     assert (path.trajectory.state_at(0.0) is None) == (start > 0.0)
-    told = [
-        paths.describe_verdict(session.shown),
-        paths.describe_limits(path, None),
-        paths.describe_uses(path, 0.0),
-        paths.describe_paths(session.shown)["rows"],
-    ]
+    told = [paths.describe_verdict(shown), paths.describe_paths(shown)["rows"]]
+    told += [paths.describe_limits(path, None), paths.describe_uses(path, 0.0)]
     json.dumps(told, allow_nan=False)
 
 

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from support.viewer.browser import LAPTOP, SCALE, WAIT, Visitor, needs_browser, open_browser
+from support.viewer.browser import (
+    LAPTOP,
+    READ_LETTERS,
+    SCALE,
+    WAIT,
+    Visitor,
+    needs_browser,
+    open_browser,
+)
 from support.viewer.sessions import LSR1, ask, blocked_session, held, wait_for_rest
 from support.viewer.sessions import wait_patiently as wait_until
 
@@ -64,7 +72,8 @@ def wait_for_scene(page: Page):
 
 def test_the_page_opens_with_verdict_board_and_limits_on_the_screen_of_a_laptop(visitor, page):
     assert visitor.text("#verdict .word") == "traversable"
-    loads = [float(one.split()[0]) for one in visitor.texts(".tyre + small")]
+    texts = visitor.tab.locator(".tyre + small").all_inner_texts()
+    loads = [float(one.split()[0]) for one in texts]
     assert len(loads) == 6 and sum(loads) == pytest.approx(LSR1.weight, rel=0.1)
     for word in ("lsr1", NAME, "firm, friction 0.8", "planning"):
         assert word in visitor.text("#subject")
@@ -292,7 +301,7 @@ def test_a_saved_file_shows_the_same_without_a_network(visitor, page, browser, t
 
 
 def test_letters_are_large_enough_and_have_contrast_and_a_phone_shows_all_of_its_width(visitor):
-    found = visitor.read_letters()
+    found = visitor.tab.evaluate(READ_LETTERS)
     assert min(one["size"] for one in found) >= 12.0
     poor = [one for one in found if one["contrast"] < 4.5]
     assert not poor, poor[:5]

@@ -18,7 +18,7 @@ from rover_planner.viewer.state.drive import Playback, Trajectory
 from rover_planner.viewer.state.path_limits import find_path_limits
 from support.grounds import gap, make_terrain, waves
 from support.paths import arc_of
-from support.viewer.sessions import LSR1, straight
+from support.viewer.sessions import LSR1, STRAIGHT
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
@@ -35,15 +35,15 @@ def trajectory_on(height, poses) -> Trajectory:
 
 
 def test_states_are_those_of_the_prediction_and_between_poses_their_mean():
-    prediction, _ = judge_path(LSR1, make_terrain(waves), straight())
-    trajectory, row = trajectory_on(waves, straight()), 37
+    prediction, _ = judge_path(LSR1, make_terrain(waves), STRAIGHT)
+    trajectory, row = trajectory_on(waves, STRAIGHT), 37
     state = trajectory.state_at(float(prediction.time[row]))
     np.testing.assert_allclose(state.wheel_loads, prediction.wheel_loads[row], rtol=1e-9)
     np.testing.assert_allclose(state.position, prediction.position[row], rtol=1e-9)
     ends = [float(time) for time in trajectory.times[10:12]]
     x, *x_ends = (trajectory.state_at(time).position[0] for time in (np.mean(ends), *ends))
     assert x == pytest.approx(np.mean(x_ends), abs=1e-9)
-    level = trajectory_on(lambda x, y: 0.0 * x, straight())
+    level = trajectory_on(lambda x, y: 0.0 * x, STRAIGHT)
     end = level.state_at(level.times[-1])
     np.testing.assert_allclose(end.spin, 2.0 / LSR1.wheel.radius, rtol=1e-6)
 

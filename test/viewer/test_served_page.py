@@ -15,16 +15,7 @@ from websockets.sync.client import connect
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.pages.sharing import read_link, write_link
 from support.grounds import make_terrain, waves
-from support.viewer.sessions import (
-    FAR,
-    LSR1,
-    PATIENCE,
-    ask,
-    held,
-    ramp,
-    session_on,
-    wait_for_rest,
-)
+from support.viewer.sessions import FAR, LSR1, PATIENCE, ask, held, ramp, session_on, wait_for_rest
 from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")

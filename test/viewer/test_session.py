@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The session behind the page, without a browser: rovers, plans, recorded paths, ends."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +16,9 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.paths import describe_changes, describe_paths, describe_verdict
 from rover_planner.viewer.state.scenario import CANDIDATES
-from support.grounds import make_terrain, wall_at, waves
+from support.grounds import make_terrain, wall_at, waves, with_std
 from support.rovers import M2020
-from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
+from support.viewer.sessions import LSR1, STRAIGHT, Judge, blocked_session, ramp, session_on
 
 # What a person looks at, and what it is compared with.
 
@@ -155,9 +154,7 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
     judged = describe_verdict(session.shown)["policies"]
     assert [one["word"] for one in judged] == ["refused"] * 3
     assert not any(one["old"] for one in judged)
-    ground = make_terrain(ramp)
-    ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
-    session = session_on(ground)
+    session = session_on(with_std(make_terrain(ramp), 1e-3))
     session.ask()
     _, servo, _ = describe_verdict(session.shown)["policies"]
     assert servo["word"] == "not judged" and "no bounds" in servo["reason"] and not servo["old"]
@@ -165,7 +162,7 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
 
 def test_a_recorded_prediction_is_shown_as_it_was_recorded_until_the_rover_is_changed(tmp_path):
     terrain, file = make_terrain(wall_at(0.5)), tmp_path / "out.npz"
-    prediction, verdict = judge_path(LSR1, terrain, straight())
+    prediction, verdict = judge_path(LSR1, terrain, STRAIGHT)
     write_prediction(file, prediction, verdict)
     again, reasons, assumptions = read_prediction(file)
     assert assumptions is None
@@ -193,7 +190,7 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     options = SweepOptions(
         policy="optimal", soil="dry_sand", friction=0.7, payload=0.5, joint_angles=angles
     )
-    prediction, verdict = judge_path(LSR1, ground, straight(), options)
+    prediction, verdict = judge_path(LSR1, ground, STRAIGHT, options)
     assert verdict.max_sinkage > 0.0
     file = tmp_path / "out.npz"
     assumed = assume(LSR1, options, 2.0)

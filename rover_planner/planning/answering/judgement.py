@@ -18,6 +18,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_query import Candidate, PathAnswer
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult
+from rover_planner.planning.search.site import Site
 from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
 
 REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUND_EXTREMES, "failure_chance")
@@ -34,8 +35,8 @@ class PathJudgement:
     """Reason why not, in words; empty if traversable."""
     candidate: Candidate | None = None
     """The judged path; None if the request was refused before."""
-    judge: PathJudge | None = None
-    """The model that has judged it; None if the request was refused before."""
+    site: Site | None = None
+    """For what it was judged; None if the request was refused before."""
     suspension: SuspensionReport | None = None
     """Comparison with the measured suspension; None without measurements."""
     search: PathAnswer | None = None
@@ -54,9 +55,9 @@ class PathJudgement:
     @cached_property
     def classes(self) -> tuple[ClassifiedWaypoint, ...]:
         """The class of each waypoint; empty if no path was judged. Computed on first use."""
-        if self.candidate is None or self.judge is None or self.is_brief:
+        if self.candidate is None or self.site is None or self.is_brief:
             return ()
-        return self.judge.classify(self.candidate)
+        return PathJudge(self.site).classify(self.candidate)
 
     def complete(self) -> "PathJudgement":
         """Return the judgement with all done that needs the model; later calls are quick.
@@ -76,10 +77,10 @@ class PathJudgement:
 
     def _with_rest(self) -> "PathJudgement":
         """Return the judgement with the waypoints beyond the first failure."""
-        candidate, judge = self.candidate, self.judge
-        if candidate is None or judge is None or candidate.is_complete or self.is_brief:
+        candidate, site = self.candidate, self.site
+        if candidate is None or site is None or candidate.is_complete or self.is_brief:
             return self
-        return replace(self, candidate=judge.check(candidate.poses))
+        return replace(self, candidate=PathJudge(site).check(candidate.poses))
 
     @property
     def _is_equal_and_traversable(self) -> bool:
@@ -122,11 +123,10 @@ class PathJudgement:
     @cached_property
     def ground(self) -> UnobservedShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
-        if self.candidate is None or self.judge is None:
+        candidate, site = self.candidate, self.site
+        if candidate is None or site is None or site.unobserved_check.seen is None:
             return None
-        site = self.judge.site
-        seen = site.unobserved_check.seen
-        return None if seen is None else seen.share(site.rover, self.candidate.poses)
+        return site.unobserved_check.seen.share(site.rover, candidate.poses)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

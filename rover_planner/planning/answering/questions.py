@@ -28,9 +28,9 @@ class PathQuestion:
     hash: str = ""
     """Hash of the request; empty if it has none."""
 
-    def judge(self, known: Snapshot) -> PathJudgement:
+    def judge(self, snapshot: Snapshot) -> PathJudgement:
         """Find a path; errors are those of `Snapshot.answer`."""
-        return known.answer(self.start, self.goal, self.tolerance).complete()
+        return snapshot.answer(self.start, self.goal, self.tolerance).complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class UnreadableRequest:
     hash: str = ""
     """Hash of the request; empty if it has none."""
 
-    def judge(self, _known: Snapshot) -> PathJudgement:
+    def judge(self, _snapshot: Snapshot) -> PathJudgement:
         """Return the refusal."""
         return refusal("bad_request", self.reason)
 
@@ -64,31 +64,31 @@ class ReachQuery:
     hash: str = ""
     """Hash of the request, which has none."""
 
-    def judge(self, known: Snapshot) -> ReachAnswer | PathJudgement:
+    def judge(self, snapshot: Snapshot) -> ReachAnswer | PathJudgement:
         """Judge the rover at the last pose of the last path with its tool at the target.
 
         Raises:
             RoverError: The rover has no arm, or the model refuses an option.
         """
-        missing = known.refuse_if_missing()
+        missing = snapshot.refuse_if_missing()
         if missing is not None:
             return missing
         if self.target is None:
             return refusal("no_target", self.target_refusal)
         if self.wrench_refusal:
             return refusal("no_wrench", self.wrench_refusal)
-        settings = known.settings
+        settings = snapshot.settings
         joints = settings.manipulator_joints
-        unknown = [name for name in joints if name not in known.joints]
+        unknown = [name for name in joints if name not in snapshot.joints]
         if 0 < len(unknown) < len(joints):
             text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
             return refusal("missing_joints", f"{text}; it must have all of them, or none")
-        assert known.path.poses is not None
-        assert known.terrain is not None
+        assert snapshot.path.poses is not None
+        assert snapshot.terrain is not None
         return judge_reach(
             settings.rover,
-            known.terrain,
-            known.path.poses[-1],
+            snapshot.terrain,
+            snapshot.path.poses[-1],
             self.target,
             settings.query.model,
             force=self.force,

@@ -15,6 +15,7 @@ from rover_planner.parameters.traverse_server import (
     USE,
     TraverseServerParameters,
 )
+from rover_planner.planning.assumptions import assume
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
@@ -53,9 +54,7 @@ class ServiceSettings:
         """Return the settings of new questions; with USE they assume the learned ground."""
         if ground is None or self.parameters.learn != USE:
             return self
-        told = (
-            self.rover.friction if self.query.model.friction is None else self.query.model.friction
-        )
+        told = assume(self.rover, self.query.model).change(self.rover).friction
         rover = ground.change(replace(self.rover, friction=told))
         return replace(self, rover=rover, query=self.query.change(friction=None), told=told)
 

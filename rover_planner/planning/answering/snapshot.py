@@ -49,9 +49,9 @@ class GivenPath:
     code: str = "no_path"
     """Code of the refusal."""
 
-    def judge(self, known: "Snapshot") -> PathJudgement:
+    def judge(self, snapshot: "Snapshot") -> PathJudgement:
         """Judge whether the rover can drive it; errors are those of `Snapshot.check_path`."""
-        return replace(known, path=self).check_path().complete()
+        return replace(snapshot, path=self).check_path().complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,9 +122,8 @@ class Snapshot:
             tolerance = 0.0
         if not (are_on_map or tolerance):  # no candidate helps: one tells as much as all
             site = replace(site, options=site.options.change(count=1))
-        judge = PathJudge(site)
-        search = judge.search(*ends, tolerance)
-        judged = self._describe(judge, search.chosen, search)
+        search = PathJudge(site).search(*ends, tolerance)
+        judged = self._describe(site, search.chosen, search)
         if not are_on_map and not judged.traversable:
             judged = replace(judged, is_brief=True)  # of what lies off the map nothing is told
         starts_unobserved = (
@@ -146,8 +145,7 @@ class Snapshot:
         if found.path is not None:
             before = None if refused is None else refused.search
             search = add_path(before, found.path, np.asarray(query.goal))
-            judge = PathJudge(query.site)
-            return replace(self._describe(judge, found.path, search), around=found)
+            return replace(self._describe(query.site, found.path, search), around=found)
         is_end = found.outcome in (START_REFUSED, GOAL_REFUSED)
         warning = found.warning if refused is None or not is_end else ""
         why = "; ".join(filter(None, (found.reason, warning)))
@@ -173,9 +171,10 @@ class Snapshot:
         if missing is not None:
             return missing
         assert self.path.poses is not None
-        judge = PathJudge(self._site())
-        poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
-        return self._describe(judge, judge.check(poses, stop_at_failure=stop_at_failure))
+        site = self._site()
+        poses = densify(self.path.poses, site.options.waypoint_spacing)
+        path = PathJudge(site).check(poses, stop_at_failure=stop_at_failure)
+        return self._describe(site, path)
 
     def refuse_if_missing(self) -> PathJudgement | None:
         """Return a refusal if there is no path or no map to use, else None."""
@@ -228,8 +227,8 @@ class Snapshot:
         return Site(settings.rover, self.known_map.terrain, options, check, self.marked)
 
     def _describe(
-        self, judge: PathJudge, candidate: Candidate, search: PathAnswer | None = None
+        self, site: Site, candidate: Candidate, search: PathAnswer | None = None
     ) -> PathJudgement:
         """Return the judgement of a judged path; classes and the rest of it follow on demand."""
         code, reason = candidate.verdict.code, candidate.verdict.reason
-        return PathJudgement(code, reason, candidate, judge, self.compare_standing(), search)
+        return PathJudgement(code, reason, candidate, site, self.compare_standing(), search)

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from rover_physics.rover.extent import reach_of_links
-from rover_physics.rover.model import Rover
+from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import (
     IMPASSABLE,
@@ -19,6 +18,7 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
+from rover_planner.maps.cells import grid_of
 from rover_planner.maps.changes import Shift, find_changes, find_overlap, have_same_layers
 
 TILE = 32
@@ -26,12 +26,10 @@ TILE = 32
 BATCH = 4096
 """Poses for which tiles are judged together; fewer would not use all threads."""
 MARGIN = 2
-"""Cells by which a footprint is widened: a height counts for the ground up to one cell away. The
-other one is for safety."""
+"""Cells by which a rover's reach is widened: a height counts for the ground up to one cell away.
+The other one is for safety."""
 SHIFT_TOLERANCE = 1e-3
 """Share of a cell by which the grids of two maps may differ and still count as the same."""
-MAX_ROLL = 1.0
-"""Roll of a body that still stands [rad]; limits of tilt are far below it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,26 +66,28 @@ class HazardMap:
         self._yaw = np.arange(headings) * (2.0 * math.pi / headings)
         self._on_map: RoverOnMap | None = None
         self._classes = np.empty((headings, 0, 0), np.int8)
-        self._stale = np.empty((headings, 0, 0), bool)
+        self._stale: NDArray[np.bool_] = np.empty((0, 0), bool)
 
     @property
     def stale_count(self) -> int:
         """Number of poses that are not judged on the present map."""
-        return int(np.count_nonzero(self._stale))
+        return self.headings * int(np.count_nonzero(self._stale))
 
     def take(self, on_map: RoverOnMap) -> None:
         """Take a rover on a map; what the change of the map cannot have changed stays."""
-        before, shape = self._on_map, (self.headings, *on_map.terrain.elevation.shape)
+        before, shape = self._on_map, on_map.terrain.elevation.shape
         shift = None if before is None else _find_shift(before, on_map)
-        classes, stale = np.full(shape, UNKNOWN, np.int8), np.ones(shape, bool)
+        classes, stale = np.full((self.headings, *shape), UNKNOWN, np.int8), np.ones(shape, bool)
         if before is not None and shift is not None:
             if before.terrain is on_map.terrain:
                 return
             changed = find_changes(before.terrain, on_map.terrain, shift)
             old, new = find_overlap(before.terrain, on_map.terrain, shift)
             classes[:, *new] = self._classes[:, *old]
-            stale[:, *new] = self._stale[:, *old]
-            stale |= self._touch_changes(on_map, changed)
+            stale[new] = self._stale[old]
+            reach = math.ceil(find_reach(on_map.rover) / on_map.terrain.resolution) + MARGIN
+            near = ndimage.maximum_filter(changed, 2 * reach + 1, mode="constant")
+            stale |= near[1:-1, 1:-1]
         self._on_map, self._classes, self._stale = on_map, classes, stale
 
     def work(self, seconds: float, near: tuple[float, float] | None = None) -> bool:
@@ -104,11 +104,13 @@ class HazardMap:
             return True
         end = time.monotonic() + seconds
         terrain = self._on_map.terrain
-        for heading, row, column in self._batches(terrain, near):
-            (x, y), cell = terrain.origin, terrain.resolution
-            poses = np.column_stack([x + cell * column, y + cell * row, self._yaw[heading]])
-            self._classes[heading, row, column] = classify_poses(self._on_map, poses)
-            self._stale[heading, row, column] = False
+        for row, column in self._batches(terrain, near):
+            poses = np.empty((self.headings, len(row), 3))
+            poses[..., 0], poses[..., 1] = grid_of(terrain).places(column, row)
+            poses[..., 2] = self._yaw[:, None]
+            found = classify_poses(self._on_map, poses.reshape(-1, 3))
+            self._classes[:, row, column] = found.reshape(self.headings, -1)
+            self._stale[row, column] = False
             if time.monotonic() > end:
                 break
         return not self._stale.any()
@@ -122,63 +124,29 @@ class HazardMap:
         x, y = terrain.origin
         return HazardView(classes, float(terrain.resolution), (float(x), float(y)))
 
-    def _touch_changes(self, on_map: RoverOnMap, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return (headings, ny, nx) True where a changed cell is below the rover.
-
-        `changed` (ny + 2, nx + 2) has one more cell at each side of the map.
-        """
-        (ahead, aside), cell = find_footprint(on_map.rover), on_map.terrain.resolution
-        ny, nx = changed.shape
-        found = np.zeros((self.headings, ny - 2, nx - 2), bool)
-        if not changed.any():
-            return found
-        grown: dict[tuple[int, int], NDArray[np.bool_]] = {}
-        for heading, yaw in enumerate(self._yaw.tolist()):
-            c, s = abs(math.cos(yaw)), abs(math.sin(yaw))
-            halves = c * ahead + s * aside, s * ahead + c * aside
-            x, y = (math.ceil(half / cell) + MARGIN for half in halves)
-            if (y, x) not in grown:
-                grown[y, x] = _grow(changed, (y, x))
-            found[heading] = grown[y, x][1:-1, 1:-1]
-        return found
-
     def _batches(
         self, terrain: Terrain, near: tuple[float, float] | None
     ) -> Iterator[NDArray[np.intp]]:
-        """Yield heading, row and column (3, n) of stale poses, BATCH or more at a time.
+        """Yield row and column (2, n) of cells with stale poses, BATCH poses or more at a time.
 
         They come tile by tile, the nearest first.
         """
-        any_heading = self._stale.any(axis=0)
-        rows, columns = (math.ceil(n / TILE) for n in any_heading.shape)
-        padded = np.zeros((rows * TILE, columns * TILE), bool)
-        padded[: any_heading.shape[0], : any_heading.shape[1]] = any_heading
-        tiles = np.argwhere(padded.reshape(rows, TILE, columns, TILE).any(axis=(1, 3)))
+        row, column = np.nonzero(self._stale)
+        is_stale = np.zeros(np.array(self._stale.shape) // TILE + 1, bool)
+        is_stale[row // TILE, column // TILE] = True
+        tiles = np.argwhere(is_stale)
         if near is not None:
             place = (np.array(near) - terrain.origin) / (TILE * terrain.resolution) - 0.5
             tiles = tiles[np.argsort(np.hypot(*(tiles[:, ::-1] - place).T), kind="stable")]
-        batch = np.empty((3, 0), np.intp)
+        batch = np.empty((2, 0), np.intp)
         for i, j in TILE * tiles:
-            stale = np.nonzero(self._stale[:, i : i + TILE, j : j + TILE])
-            batch = np.concatenate([batch, np.add(stale, [[0], [i], [j]])], axis=1)
-            if batch.shape[1] >= BATCH:
+            stale = np.nonzero(self._stale[i : i + TILE, j : j + TILE])
+            batch = np.concatenate([batch, np.add(stale, [[i], [j]])], axis=1)
+            if self.headings * batch.shape[1] >= BATCH:
                 yield batch
                 batch = batch[:, :0]
         if batch.size:
             yield batch
-
-
-def _grow(cells: NDArray[np.bool_], widths: tuple[int, int]) -> NDArray[np.bool_]:
-    """Return cells that have a True cell within `widths` rows and columns."""
-    where = ndimage.find_objects(cells.astype(np.int8))[0]
-    box = tuple(
-        slice(max(0, one.start - width), one.stop + width)
-        for one, width in zip(where, widths, strict=True)
-    )
-    size = 2 * widths[0] + 1, 2 * widths[1] + 1
-    grown = np.zeros(cells.shape, bool)
-    grown[box] = ndimage.maximum_filter(cells[box].astype(np.uint8), size, mode="constant")
-    return grown
 
 
 def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
@@ -199,20 +167,3 @@ def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
     if old.origin != new.origin and np.abs(moved - cells).max() > SHIFT_TOLERANCE:
         return None
     return int(cells[1]), int(cells[0])
-
-
-def find_footprint(rover: Rover) -> tuple[float, float]:
-    """Return how far a rover extends from its body origin along and across its heading [m].
-
-    It never leaves this rectangle, whatever the angles of its suspension: a wheel is never further
-    from its pivots than its links are long. A body that rolls by up to MAX_ROLL moves it sideways
-    by that length times the sine.
-    """
-    wheel, steep = rover.wheel, math.sin(MAX_ROLL)
-    ahead = aside = 0.0
-    for name, centre in rover.suspension.wheels.items():
-        along = reach_of_links(rover, name) + wheel.radius
-        across = abs(centre[1]) + 0.5 * wheel.width
-        ahead, aside = max(ahead, along), max(aside, math.hypot(across, steep * along))
-    x, y, z = (max(map(abs, side)) for side in (rover.belly.x, rover.belly.y, (rover.belly.z,)))
-    return (max(ahead, math.hypot(x, z)), max(aside, math.hypot(y, z)))

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Remembers judged edges and the last path, from one search to the next."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.ground import BLOCK
@@ -17,6 +19,10 @@ from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, make_primitives
 from rover_planner.planning.search.query import SearchQuery
 from rover_planner.planning.search.site import Site
+
+MARGIN = BLOCK + 1
+"""Distance from wheels and body within which ground counts for a pose [cells]: the kernels look at
+the blocks of cells that these touch, however they are turned, and at the cells around them."""
 
 PosesByModel = tuple[KnownPoses, KnownPoses]
 """What is known of poses of whole paths, and of the pieces that a search asks about in numbers,
@@ -32,64 +38,65 @@ class EdgeMemory:
     """
 
     def __init__(self) -> None:
-        self._edges: tuple[Site, Edges] | None = None
-        self._path: tuple[SearchQuery, list[Piece]] | None = None
-        self._poses: tuple[Site, PosesByModel] | None = None
+        self._site: Site | None = None
+        self._edges: Edges | None = None
+        self._poses: PosesByModel | None = None
+        self._query: SearchQuery | None = None
+        self._pieces: list[Piece] = []
+
+    def begin(self, site: Site) -> PosesByModel:
+        """Forget what does not hold at the site of the next search.
+
+        Returns what is known of poses of whole paths, and of pieces; what is added is kept.
+        """
+        before, self._site = self._site, site
+        if self._poses is None or before is None or not _is_alike(before, site):
+            of_pieces, is_same = KnownPoses(), site.options.asked_chance is None
+            self._poses = KnownPoses(others=of_pieces if is_same else None), of_pieces
+            self._edges = None
+            self._forget_costs(lambda places: np.ones(len(places), bool))
+            return self._poses
+        reach = find_reach(site.rover) + MARGIN * site.terrain.resolution
+        changed = _count_changes(before, site)
+        are_near = partial(changed.are_near, reach=reach)
+        for one in self._poses:
+            one.forget(are_near)
+        if self._edges is not None:
+            self._edges.forget(_find_touching(self._edges, changed, reach))
+        self._forget_costs(are_near)
+        return self._poses
+
+    def _forget_costs(self, are_near: Callable[[Floats], NDArray[np.bool_]]) -> None:
+        """Forget the costs of pieces of the path with places (n, 2) of which some are near."""
+        self._pieces = [
+            replace(one, cost=np.nan) if are_near(one.poses[:, :2]).any() else one
+            for one in self._pieces
+        ]
 
     def keep_path(self, query: SearchQuery, pieces: list[Piece]) -> None:
         """Keep the pieces of the path that answers a query."""
-        self._path = query, pieces
+        self._query, self._pieces = query, pieces
 
     def recall_path(self, query: SearchQuery) -> list[Piece]:
         """Return the pieces of the last path if it was between the same ends for the same rover.
 
         Their cost is NaN where the map or the options may have changed it.
         """
-        if self._path is None:
-            return []
-        asked, pieces = self._path
+        asked = self._query
         is_same = (
-            asked.site.rover == query.site.rover
+            asked is not None
+            and asked.site.rover == query.site.rover
             and np.array_equal(asked.start, query.start)
             and np.array_equal(asked.goal, query.goal)
         )
-        if not is_same:
-            return []
-        if not _is_alike(asked.site, query.site):
-            return [replace(one, cost=np.nan) for one in pieces]
-        poses, firsts = np.concatenate([one.poses for one in pieces]), [0]
-        firsts += np.cumsum([len(one.poses) for one in pieces[:-1]]).tolist()
-        changed = _count_changes(asked.site, query.site)
-        near = changed.are_near(poses[:, :2], _reach_of(query.site))
-        return [
-            replace(one, cost=np.nan) if is_near else one
-            for one, is_near in zip(pieces, np.logical_or.reduceat(near, firsts), strict=True)
-        ]
+        return self._pieces if is_same else []
 
-    def recall_poses(self, site: Site) -> PosesByModel:
-        """Return what is known of poses of whole paths, and of pieces; what is added is kept."""
-        if self._poses is None or not _is_alike(self._poses[0], site):
-            of_pieces, is_same = KnownPoses(), site.options.accepted_chance >= 1.0
-            known = KnownPoses(others=of_pieces if is_same else None), of_pieces
-        else:
-            asked, known = self._poses
-            changed, reach = _count_changes(asked, site), _reach_of(site)
-            for one in known:
-                one.forget(partial(changed.are_near, reach=reach))
-        self._poses = site, known
-        return known
-
-    def recall(self, site: Site, nodes: Nodes) -> Edges:
+    def recall_edges(self, site: Site, nodes: Nodes) -> Edges:
         """Return the edges between nodes with what is known of them; what is added is kept."""
-        last = self._edges
-        if last is None or last[1].nodes != nodes or not _is_alike(last[0], site):
+        if self._edges is None or self._edges.nodes != nodes:
             spacing = site.options.waypoint_spacing
-            edges = Edges(nodes, make_primitives(site.rover, nodes.cell, spacing))
-        else:
-            asked, edges = last
-            edges.forget(_find_touching(site, edges, _count_changes(asked, site)))
-        self._edges = site, edges
-        return edges
+            self._edges = Edges(nodes, make_primitives(site.rover, nodes.cell, spacing))
+        return self._edges
 
 
 def _is_alike(asked: Site, site: Site) -> bool:
@@ -107,7 +114,6 @@ def _is_alike(asked: Site, site: Site) -> bool:
     )
 
 
-@lru_cache(maxsize=1)
 def _count_changes(asked: Site, site: Site) -> CellCounts:
     """Return the cells in which the maps of two sites that are alike differ, as counts."""
     before, now = asked.unobserved_check.kinds, site.unobserved_check.kinds
@@ -119,17 +125,8 @@ def _count_changes(asked: Site, site: Site) -> CellCounts:
     return CellCounts(site.terrain, changed)
 
 
-def _reach_of(site: Site) -> float:
-    """Return how far from the body origin ground may count for a pose [m].
-
-    The kernels look at the blocks of cells that wheels and body touch, however these are turned,
-    and at the cells around them.
-    """
-    return find_reach(site.rover) + (BLOCK + 1) * site.terrain.resolution
-
-
-def _find_touching(site: Site, edges: Edges, changed: CellCounts) -> NDArray[np.int64]:
-    """Return the places (k,) of nodes from which an edge may lead over changed cells."""
+def _find_touching(edges: Edges, changed: CellCounts, reach: float) -> NDArray[np.int64]:
+    """Return the places (k,) of nodes whose edges may lead within `reach` [m] of changed cells."""
     longest = max(one.length for own in edges.primitives for one in own)
     places = edges.nodes.poses(np.arange(0, edges.nodes.count, HEADINGS))[:, :2]
-    return np.flatnonzero(changed.are_near(places, longest + _reach_of(site)))
+    return np.flatnonzero(changed.are_near(places, longest + reach))

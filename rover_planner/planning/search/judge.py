@@ -21,8 +21,10 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from rover_physics.bounds.path import is_uncertain
+from rover_physics.limits.table import CHANCE
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -30,9 +32,9 @@ from rover_physics.results.uses import find_codes
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
-from rover_physics.traversability.judge import judge_poses
+from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
 from rover_physics.traversability.pieces import PieceVerdict, find_exposure, judge_pieces
-from rover_physics.traversability.verdict import Verdict
+from rover_physics.traversability.verdict import Verdict, with_refusals
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_geometry import rings_within
@@ -40,13 +42,11 @@ from rover_planner.planning.path_query import (
     Candidate,
     PathAnswer,
     Pose,
-    answer_path_query,
-    check_path,
-    choose_by_chance,
+    choose,
+    generate_paths,
 )
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 from rover_planner.planning.search.site import Site
-from rover_planner.planning.search.unobserved_check import physical
 
 CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""
@@ -84,7 +84,7 @@ class PathJudge:
     asked_poses: int = field(default=0, init=False)
     """Number of poses that searches have asked for so far, a measure of the work done."""
 
-    def search(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> PathAnswer:
+    def search(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> PathAnswer:
         """Find a path from start to goal, or to a goal near it, among candidate paths.
 
         Args:
@@ -100,30 +100,59 @@ class PathJudge:
             PlanningError: Start, goal or options are invalid.
             RoverError: The model refuses an option or the poses.
         """
-        answer, end, tried = self._query(start, goal), goal, 0
+        start, goal = np.asarray(start, float), np.asarray(goal, float)
+        answer, end, tried = self._answer(start, goal), goal, 0
         if not answer.traversable and self._fails_at(answer, goal, tolerance):
             rings = self.goals_near(start, goal, tolerance)
             for alternative in (one for ring in rings for one in islice(ring, _QUERIES_PER_RING)):
                 tried += 1
-                other = self._query(start, alternative)
+                other = self._answer(start, alternative)
                 if other.traversable:
                     answer, end = other, alternative
                     break
         offset = float(np.hypot(*(end - goal)[:2]))
         return replace(answer, goal=end, goal_offset=offset, alternatives_tried=tried)
 
-    def _query(self, start: Pose, goal: Pose) -> PathAnswer:
-        """Return the answer whose choice is among the candidates whose ground is not refused.
+    def _answer(self, start: Pose, goal: Pose) -> PathAnswer:
+        """Judge the candidate paths to a goal and choose the best one that passes.
 
-        If all that are traversable are refused, the best of them is explained.
+        Of several candidates, or with a goal off the map, a refused one is judged up to its first
+        failure. If the ground of all that pass is refused, the best of them is explained.
         """
         site = self.site
-        answer = answer_path_query(site.rover, site.terrain, start, goal, site.options)
+        paths = generate_paths(site.rover, start, goal, site.options)
+        if len(paths) == 1 and site.terrain.contains(*paths[0][-1, :2]):
+            answer = choose((self._judge_path(paths[0]),))
+        else:
+            judged = judge_paths(
+                site.rover,
+                site.terrain,
+                paths,
+                site.options.model,
+                sigmas=site.options.map_sigmas,
+                stop_at_failure=True,
+            )
+            answer = self._choose_by_chance(
+                [Candidate(poses, *one) for poses, one in zip(paths, judged, strict=True)]
+            )
         if not answer.traversable:
             return answer
-        paths = [site.hold(candidate) for candidate in answer.candidates]
-        held = choose_by_chance(site.rover, site.terrain, paths, site.options)
-        return held if held.traversable else replace(held, choice=answer.choice)
+        allowed = self._choose_by_chance([*map(site.refuse_ground, answer.candidates)])
+        return allowed if allowed.traversable else replace(allowed, choice=answer.choice)
+
+    def _choose_by_chance(self, candidates: list[Candidate]) -> PathAnswer:
+        """Choose the passing candidate with the lowest cost whose chance of failure is accepted.
+
+        Chances are found in the order of the costs, up to the first that is accepted.
+        """
+        while (answer := choose(tuple(candidates))).traversable:
+            chosen = answer.chosen
+            if self.site.options.asked_chance is None or chosen.verdict.failure_chance_at:
+                return answer
+            candidates[answer.choice] = self._judge_path(chosen.poses, stop_at_failure=True)
+        if answer.chosen.verdict.code == CHANCE:
+            candidates[answer.choice] = self._judge_path(answer.chosen.poses)
+        return choose(tuple(candidates))
 
     def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
         """Return whether another goal within `tolerance` [m] may help.
@@ -147,57 +176,69 @@ class PathJudge:
         """
         for ring in rings_within(start, goal, tolerance, self.site.rover.wheel.radius):
             reached = np.array(ring)[~self.site.marked.refuses_ends(start, np.array(ring))]
-            judged = ((pose, self.site.hold(self._judge_path(pose[None, :]))) for pose in reached)
-            yield (pose for pose, one in judged if one.verdict.traversable)
+            judged = map(self._judge_path, reached[:, None, :])
+            allowed = zip(reached, map(self.site.refuse_ground, judged), strict=True)
+            yield (pose for pose, path in allowed if path.verdict.traversable)
 
     def check(self, poses: NDArray[np.float64], *, stop_at_failure: bool = False) -> Candidate:
-        """Judge one given path of poses (n, 3), if wanted only up to its first failure.
+        """Judge one given path of poses (n, 3).
+
+        With `stop_at_failure`, the waypoints beyond the first failure are left out, and a chance
+        of failure above the accepted one may be larger than is said. The chance is asked for only
+        where the path passes without it.
 
         Raises:
             RoverError: The model refuses an option or the poses.
         """
         self.asked_poses += len(poses)
-        return self.site.hold(self._judge_path(poses, stop_at_failure=stop_at_failure))
+        return self.site.refuse_ground(self._judge_path(poses, stop_at_failure=stop_at_failure))
 
     def _judge_path(
         self, poses: NDArray[np.float64], *, stop_at_failure: bool = False
     ) -> Candidate:
+        """Judge a path as `check`, on whatever ground."""
         site = self.site
-        return check_path(
+        judged = judge_path(
             site.rover,
             site.terrain,
             poses,
-            site.options,
+            site.options.model,
+            sigmas=site.options.map_sigmas,
             stop_at_failure=stop_at_failure,
+            accepted_chance=site.options.asked_chance,
+            chance_of_refused=False,
             known=self.known,
         )
+        return Candidate(poses, *judged)
 
     def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
         """Return the class of each waypoint of a judged path; may evaluate the path once more."""
-        site = self.site
-        judged = physical(candidate)
+        site, verdict = self.site, candidate.verdict
+        if {UNOBSERVED_CODE, MARKED_CODE} & set(verdict.codes):  # which the model passes
+            none = [""] * len(verdict.codes)
+            verdict = with_refusals(verdict, none, none)
         return classify_judged(
             site.rover,
             site.terrain,
-            judged.prediction,
-            judged.verdict,
+            candidate.prediction,
+            verdict,
             site.options.model,
             sigmas=site.options.map_sigmas,
         )
 
     @cached_property
     def _cautious(self) -> tuple[Terrain, SweepOptions]:
-        """Ground and options for pieces of path: as told, or such that their chance is accepted.
+        """Ground and options for pieces of path, such that their chance is accepted.
 
         With the friction and the torque limit below which they are with the accepted chance,
         pieces need no samples; the whole path gets them.
         """
-        terrain, options, told = self.site.terrain, self.site.options, self.site.rover
-        accepted, model = options.accepted_chance, options.model
-        if accepted >= 1.0:
+        terrain, rover = self.site.terrain, self.site.assumed_rover
+        accepted, model = self.site.options.asked_chance, self.site.options.model
+        if accepted is None:
             return terrain, model
         low = min(NormalDist().inv_cdf(max(accepted, LEAST_CHANCE)), 0.0)
-        off = told.uncertainty
+        off = rover.uncertainty
         friction, torque = (
             max(1.0 + low * math.hypot(std, off.model), LEAST_SHARE)
             for std in (off.friction, off.max_torque)
@@ -206,9 +247,8 @@ class PathJudge:
         ground = terrain if layer is None else replace(terrain, friction=friction * layer)
         return ground, replace(
             model,
-            friction=friction * (told.friction if model.friction is None else model.friction),
-            max_torque=torque
-            * (told.wheel.max_torque if model.max_torque is None else model.max_torque),
+            friction=friction * rover.friction,
+            max_torque=torque * rover.wheel.max_torque,
         )
 
     def judge_pieces(self, pieces: Sequence[Piece]) -> list[JudgedPiece]:
@@ -236,7 +276,7 @@ class PathJudge:
         A rover that slips ahead up a slope of sand stands there if it can back out.
         """
         site = self.site
-        if site.terrain.elevation_std is None or not site.options.map_sigmas:
+        if not is_uncertain(site.terrain, site.options.map_sigmas):
             self.asked_poses += len(poses)
             model = pack_model(site.rover, site.terrain, site.options.model)
             codes = find_codes(model.limits, model.evaluate(poses))

@@ -174,14 +174,14 @@ def _weigh_chances(
     """
     began, weight = time.perf_counter(), settings.chance_weight
     accepted = min(query.site.options.accepted_chance, ASKED)
-    answers, totals, told = [], [], None
+    answers, totals, earlier = [], [], None
     while True:
         settings = replace(settings, budget=0.5 * settings.budget)
         options = query.site.options.change(accepted_chance=accepted)
         asked = replace(query.site, options=options)
-        finder = _PathFinder(replace(query, site=asked), settings, memory, on_progress, told)
+        finder = _PathFinder(replace(query, site=asked), settings, memory, on_progress, earlier)
         answers.append(finder.answer())
-        path, memory, told = answers[-1].path, None, finder.progress
+        path, memory, earlier = answers[-1].path, None, finder.progress
         if path is None:
             break
         cost = cost_of_path(query.site.rover, answers[-1].pieces, path)
@@ -207,18 +207,18 @@ class _PathFinder:
         settings: LatticeSettings,
         memory: EdgeMemory | None,
         on_progress: Callable[[SearchProgress], None] | None,
-        told: SearchProgress | None = None,
+        earlier: SearchProgress | None = None,
     ):
-        """Prepare a search; until it finds a path, `told` of an earlier one is its progress."""
+        """Prepare a search; until it finds a path, it tells the progress of the `earlier` one."""
         self._began = time.perf_counter()
         self._query, self._settings = query, settings
-        self._on_progress, self._told = on_progress, told
+        self._on_progress, self._earlier = on_progress, earlier
         self._site = query.site
         self._start = _check_end("start", query.start, query.site.terrain)
         ground = None if settings.frontier else query.site.terrain
         self._goal = _check_end("goal", query.goal, ground)
         self._memory = memory or EdgeMemory()
-        self._judge = PathJudge(query.site, *self._memory.recall_poses(query.site))
+        self._judge = PathJudge(query.site, *self._memory.begin(query.site))
         cell = settings.cell or 0.25 * query.site.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
         self._radius = tightest_radius(query.site.rover)
@@ -353,8 +353,8 @@ class _PathFinder:
         """Return the search, with the estimates of the ground and the connections of the ends."""
         site, nodes = self._site, self._nodes
         rover, spacing = site.rover, site.options.waypoint_spacing
-        edges = self._memory.recall(site, nodes)
-        climb = steepest_climb(rover, site.options.model.friction or rover.friction)
+        edges = self._memory.recall_edges(site, nodes)
+        climb = steepest_climb(rover, site.assumed_rover.friction)
         terrain = cut_out(site, nodes) if self._is_limited else site.terrain
         ground = estimate_ground(rover, terrain, nodes)
         edges.standing[ground.groundless] = edges.state_of("unknown_ground")
@@ -387,7 +387,7 @@ class _PathFinder:
         """Tell of the progress of the search, and return whether it may go on."""
         if self._on_progress is not None:
             is_found = search.progress.best is not None
-            self._on_progress(search.progress if is_found else self._told or search.progress)
+            self._on_progress(search.progress if is_found else self._earlier or search.progress)
         if self._settings.ends_at_first and search.progress.best is not None:
             return False
         budget = self._settings.budget
@@ -448,8 +448,8 @@ def _check_end(name: str, end: ArrayLike, terrain: Terrain | None) -> Pose:
     if terrain is not None and not terrain.contains(pose[0], pose[1]):
         xmin, xmax, ymin, ymax = terrain.bounds
         raise PlanningError(
-            f"{name} is at ({pose[0]:g}, {pose[1]:g}), off the map, which goes from x {xmin:g} to "
-            f"{xmax:g} and y {ymin:g} to {ymax:g} m"
+            f"{name} is at ({pose[0]:.10g}, {pose[1]:.10g}), off the map, which goes from "
+            f"x {xmin:.10g} to {xmax:.10g} and y {ymin:.10g} to {ymax:.10g} m"
         )
     return pose
 

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """One rover on one map, with the options of its paths and what refuses them there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
+from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
+from rover_planner.planning.assumptions import assume
+from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.unobserved_check import NONE_REFUSED, UnobservedCheck
 
@@ -18,7 +20,7 @@ class Site:
     """The rover."""
     terrain: Terrain
     """The ground, map frame."""
-    options: PathQueryOptions
+    options: PathQueryOptions = field(default_factory=PathQueryOptions)
     """Options of candidates and of the judgement of paths."""
     unobserved_check: UnobservedCheck = NONE_REFUSED
     """Refuses ground under the belly that was never seen."""
@@ -28,6 +30,19 @@ class Site:
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", self.options.fit(self.rover))
 
-    def hold(self, path: Candidate) -> Candidate:
-        """Return a path, refused where its ground was never seen or is marked."""
-        return self.marked.hold(self.unobserved_check.hold(self.rover, path))
+    @property
+    def assumed_rover(self) -> Rover:
+        """The rover with friction, torque and payload of the options in place of its own."""
+        return assume(self.rover, self.options.model).change(self.rover)
+
+    def refuse_ground(self, path: Candidate) -> Candidate:
+        """Return a path as the model judged it, refused where its ground is unseen or marked."""
+        if not path.verdict.traversable:
+            return path
+        unseen = self.unobserved_check.find(self.rover, path.poses)
+        if unseen is not None:
+            return path.refuse_at(unseen[0], UNOBSERVED_CODE, unseen[1])
+        entered = self.marked.find(path.poses)
+        if entered is not None:
+            return path.refuse_at(entered[0], MARKED_CODE, entered[1].describe())
+        return path

@@ -2,26 +2,18 @@
 """Refuses paths over never seen ground under the belly, as the settings say, and reports it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
-from rover_physics.traversability.verdict import with_refusals
-from rover_planner.maps.unobserved_ground import (
-    ALLOW,
-    REFUSE,
-    UNOBSERVED_CODE,
-    ObservedGround,
-)
-from rover_planner.planning.marked_places import MARKED_CODE
-from rover_planner.planning.path_query import Candidate
+from rover_planner.maps.unobserved_ground import ALLOW, REFUSE, ObservedGround
 
 
 @dataclass(frozen=True, eq=False)
 class UnobservedCheck:
-    """Holds paths against what was seen of one map."""
+    """Tells which paths lead over ground of one map that was never seen, and may not."""
 
     seen: ObservedGround | None = None
     """The seen part of the map; None if it is not known, then the rule is ALLOW."""
@@ -33,25 +25,24 @@ class UnobservedCheck:
         """(ny, nx) what was seen of each cell; None if the rule does not ask."""
         return None if self.seen is None or self.rule == ALLOW else self.seen.kinds
 
-    def hold(self, rover: Rover, candidate: Candidate) -> Candidate:
-        """Return a traversable path with a refusal where the rule refuses its ground."""
-        if self.seen is None or self.rule == ALLOW or not candidate.verdict.traversable:
-            return candidate
-        share = self.seen.share(rover, candidate.poses)
+    def find(self, rover: Rover, poses: NDArray[np.float64]) -> tuple[int, str] | None:
+        """Return the first waypoint of a path (n, 3) whose ground the rule refuses, and why."""
+        if self.seen is None or self.rule == ALLOW:
+            return None
+        share = self.seen.share(rover, poses)
         first = share.first_refused(self.rule)
         if first < 0:
-            return candidate
+            return None
         counted = share.unobserved_share - (0.0 if self.rule == REFUSE else share.footprint_share)
-        reason = (
+        return first, (
             f"ground under the belly that was never seen: {100.0 * counted:.1f} % of that along "
             f"the path {self._name_rule()}"
         )
-        return candidate.refuse_at(first, UNOBSERVED_CODE, reason)
 
     def refuses(self, rover: Rover, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
         """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).
 
-        Each pose counts. `hold` looks at a path where the belly has moved on by a cell, so a path
+        Each pose counts. `find` looks at a path where the belly has moved on by a cell, so a path
         of pieces that are not refused passes there.
         """
         if self.seen is None or not pieces:
@@ -70,11 +61,3 @@ class UnobservedCheck:
 
 NONE_REFUSED = UnobservedCheck()
 """Allows all ground."""
-
-
-def physical(candidate: Candidate) -> Candidate:
-    """Return a path as the model judged it, without a refusal by a `hold`."""
-    if not {UNOBSERVED_CODE, MARKED_CODE} & set(candidate.verdict.codes):
-        return candidate
-    none = [""] * len(candidate.poses)
-    return replace(candidate, verdict=with_refusals(candidate.verdict, none, none))

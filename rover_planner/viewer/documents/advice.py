@@ -8,8 +8,6 @@ from typing import Any
 from rover_planner.advice.advise import STOPPED, Advice, grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
-from rover_planner.planning.assumptions import assume
-from rover_planner.planning.search.site import Site
 from rover_planner.viewer.state.scenario import JudgedPath, Scenario
 
 PROMISED = 20.0
@@ -40,9 +38,7 @@ def seek_advice(advised: Advised) -> Iterator[Advised]:
     Raises:
         RoverError: The model refuses the path or an option.
     """
-    asked = advised.path.scenario
-    site = Site(asked.rover, asked.terrain, asked.options)
-    case = case_of(site, advised.path.poses)
+    case = case_of(advised.path.scenario.site, advised.path.poses)
     for found in grow_advice(case):
         yield replace(advised, advice=found)
 
@@ -56,7 +52,7 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
     has_path, model = case.poses is not remedy.refusal.case.poses, case.options
     return replace(
         scenario,
-        rover=assume(case.rover, case.options).change(case.rover),
+        rover=case.site.assumed_rover,
         options=scenario.options.change(
             policy=model.policy, backward=model.backward, joint_angles=model.joint_angles
         ),

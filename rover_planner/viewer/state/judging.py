@@ -13,11 +13,11 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import predict_paths
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.traversability.verdict import hold_against_limits
-from rover_planner.planning.path_query import check_path, choose, generate_paths
+from rover_planner.planning.path_query import choose, generate_paths
 from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult, find_path
 from rover_planner.planning.search.query import SearchQuery
-from rover_planner.planning.search.site import Site
 from rover_planner.viewer.state.background_work import WorkStep
 from rover_planner.viewer.state.scenario import JudgedPath, Scenario, Shown
 
@@ -177,8 +177,7 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
     """
     yield WorkStep(SEARCH)
     asked = shown.scenario
-    site = Site(asked.rover, asked.terrain, asked.options)
-    question = SearchQuery(site, asked.start, asked.goal)
+    question = SearchQuery(asked.site, asked.start, asked.goal)
     first = find_path(question, replace(asked.search, ends_at_first=True), memory)
     yield _add_path(shown, first)
     left = asked.search.budget - first.seconds
@@ -200,6 +199,5 @@ def _add_path(shown: Shown, around: SearchResult) -> Shown:
 
 def _judge(scenario: Scenario, poses: Floats) -> JudgedPath:
     """Judge a path up to its first failure, where its playback ends."""
-    rover, terrain, options = scenario.rover, scenario.terrain, scenario.options
-    candidate = check_path(rover, terrain, poses, options, stop_at_failure=True)
-    return JudgedPath(**vars(replace(candidate, poses=poses)), scenario=scenario)
+    candidate = PathJudge(scenario.site).check(poses, stop_at_failure=True)
+    return JudgedPath(**vars(candidate), scenario=scenario)

@@ -16,6 +16,7 @@ from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
+from rover_planner.planning.search.site import Site
 from rover_planner.viewer.state.drive import RoverState, Trajectory
 from rover_planner.viewer.state.path_limits import (
     Failure,
@@ -51,6 +52,11 @@ class Scenario:
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
     search: LatticeSettings = field(default_factory=LatticeSettings)
     """Options of the search of a path around obstacles."""
+
+    @property
+    def site(self) -> Site:
+        """The rover on the ground, with the options."""
+        return Site(self.rover, self.terrain, self.options)
 
     @property
     def candidates(self) -> PathQueryOptions:

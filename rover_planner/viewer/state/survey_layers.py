@@ -16,7 +16,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain, fingerprint
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
-from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
     CLASS_COLOURS,
     CLASS_LABELS,
@@ -144,10 +143,7 @@ def load_map(path: Path, max_cells: int) -> Terrain:
             f"the map of {show_file(path)} has {rows} x {columns} cells; --max-cells is "
             f"{max_cells}"
         )
-    if isinstance(source, GeoTiffMap) and source.hash_content() != notes.description["map"]:
-        raise PlanningError(
-            f"{show_file(notes.map_file)} has changed since {show_file(path)} was made"
-        )
+    store.check_map()
     grids: Any = source.read((slice(0, rows), slice(0, columns)))
     frame = notes.frame
     return Terrain(

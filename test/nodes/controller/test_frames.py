@@ -13,9 +13,9 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
+from support.grounds import RESOLUTION, plane
 from support.messages import odometry_at, send_map_odom
 from support.ros_fixtures import run_in_executor
-from support.rough_grounds import RESOLUTION, plane
 from support.waiting import repeat_until, wait_until
 
 MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)

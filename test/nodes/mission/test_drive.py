@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive goes on where its rover is held up, and ends where nothing helps."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,16 +12,17 @@ from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.nodes.mission.errors import DriveFailedError
 from rover_planner.nodes.mission.server_client import Answer
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.site import Site
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from support.grounds import make_terrain
-from support.rough_grounds import plane
+from support.grounds import make_terrain, plane
 from support.rovers import LSR1
 
 MAP = plane(0.0, 0.0, half=4.0)
 STEP = 0.1
-COARSE = PathQueryOptions(count=1, waypoint_spacing=0.05)
+JUDGE = PathJudge(Site(LSR1, MAP, PathQueryOptions(count=1, waypoint_spacing=0.05)))
 SETTINGS = DriveSettings(position_tolerance=0.1, patience=0.3)
 
 
@@ -35,7 +37,7 @@ class SimulatedRover:
 
     def ask(self, start, goal):
         self.asked.append(np.array(start))
-        answer = answer_path_query(LSR1, MAP, start, goal, COARSE)
+        answer = JUDGE.search(start, goal)
         poses = answer.chosen.poses if answer.traversable else []
         return Answer(answer.traversable, True, "", answer.explain(), poses, {})
 
@@ -43,9 +45,8 @@ class SimulatedRover:
         self.follower = self.make_follower(poses, 0.3)
 
     def check(self, poses):
-        candidate = check_path(LSR1, MAP, poses, COARSE)
-        held = self.marked.hold(candidate).verdict
-        return Answer(held.traversable, True, held.code, held.reason, poses, {})
+        verdict = PathJudge(replace(JUDGE.site, marked=self.marked)).check(poses).verdict
+        return Answer(verdict.traversable, True, verdict.code, verdict.reason, poses, {})
 
     def has_ended(self):
         return self.follower.has_arrived(self.plant.pose()) if self.speaks else None

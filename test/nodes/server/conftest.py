@@ -6,6 +6,7 @@ first in a file.
 """
 
 import gc
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,3 +37,21 @@ def shared(shared_nodes):
         shared_nodes.client.send_terrain(WAVES)
     shared_nodes.client.logs.clear()
     return shared_nodes
+
+
+@pytest.fixture
+def hold(monkeypatch):
+    """Return a function that has a method wait; it returns what tells of a call and ends waits."""
+
+    def hold_calls(kind, name):
+        call, began, go_on = getattr(kind, name), threading.Event(), threading.Event()
+
+        def wait(*given):
+            began.set()
+            assert go_on.wait(60.0)
+            return call(*given)
+
+        monkeypatch.setattr(kind, name, wait)
+        return began, go_on
+
+    return hold_calls

@@ -103,7 +103,7 @@ def test_a_path_to_a_pose_is_the_plan_of_can_traverse_and_a_goal_without_one_has
     handle, result = compute(server, start, goal)
     assert handle.succeed.called and result.error_code == 0
     np.testing.assert_array_equal(path_to_poses(result.path, "map"), plan)
-    client.send_odometry(start)
+    client.stand(start)
     wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
     _, result = compute(server, None, goal)
     np.testing.assert_allclose(path_to_poses(result.path, "map"), plan, atol=1e-9)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A traverse server merges maps of both kinds, and fills the ground on which the rover stands."""
 
-import threading
 import time
 
 import numpy as np
@@ -16,7 +15,7 @@ from rover_planner.ros.qos import map_qos
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import SERVER, ask
 from support.ros_fixtures import hear
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 PRIOR = make_terrain(waves)
 
@@ -41,20 +40,13 @@ def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, t
 
 @pytest.mark.timed
 def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
-    start_server, client, tmp_path, monkeypatch
+    start_server, client, tmp_path, hold
 ):
     file = tmp_path / "prior.npz"
     save_terrain(file, PRIOR)
     server = start_server(terrain_file=str(file), planner="fan")
     before = server.service.known_map.fingerprint
-    merge, began, go_on = MapKeeper.take, threading.Event(), threading.Event()
-
-    def take_later(keeper, *given):
-        began.set()
-        assert go_on.wait(60.0)
-        return merge(keeper, *given)
-
-    monkeypatch.setattr(MapKeeper, "take", take_later)
+    began, go_on = hold(MapKeeper, "take")
     client.send_cloud(terrain_to_point_cloud(make_terrain(wall_at(0.5)), "map"))
     assert began.wait(20.0), "the map"
     assert ask(client)[1]["map_hash"] == before
@@ -70,15 +62,13 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
     server = start_server(planner="fan", footprint_margin=0.1)
     client.send_terrain(make_terrain(lambda x, y: np.where(x < 0.0, np.nan, 0.0 * x)))
     start, goal = (-0.45, 0.0, 0.0), (2.0, 0.0, 0.0)
-
-    def is_filled():
-        client.send_joints(SUSPENSION_JOINTS, 4 * [0.0])
-        client.send_odometry(start, height=0.3)  # of the body's origin of lsr1
-        time.sleep(0.1)
-        return any("ground under the rover filled" in line for line in client.logs)
-
     before = server.service.known_map
-    wait_until(is_filled, "the filled ground")
+    client.stand(start, height=0.3)  # of the body's origin of lsr1
+    repeat_until(
+        lambda: client.send_joints(SUSPENSION_JOINTS, 4 * [0.0]),
+        lambda: any("ground under the rover filled" in line for line in client.logs),
+        "the filled ground",
+    )
     after = server.service.known_map
     assert (after.arrival, after.stamp) == (before.arrival, before.stamp)
     assert ask(client, start, goal)[1]["traversable"] == "true"

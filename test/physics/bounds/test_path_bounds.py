@@ -17,18 +17,13 @@ from rover_physics import Rover, SweepOptions, Terrain, judge_path
 from rover_physics.errors import ModelError
 from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.status import BoundStatus
-from support.grounds import make_terrain
+from support.grounds import RESOLUTION, fractal, make_terrain, plane, rocky, with_std
 from support.paths import arc_of, poses_at
-from support.rough_grounds import RESOLUTION, fractal, plane, rocky, with_std
+from support.reference_drives import drive_ground
 from support.rovers import LSR1, M2020
 
 ROUNDING = 1e-6
 """Tolerance of the bounds for rounding errors, in the unit of each value."""
-
-
-def step(height: float) -> Terrain:
-    """Return level ground with a step up of `height` [m] at x = 0.3."""
-    return make_terrain(lambda x, y: height * (x > 0.3), RESOLUTION, 3.0)
 
 
 GROUNDS = {
@@ -36,7 +31,7 @@ GROUNDS = {
     "slope": lambda rover: plane(0.25, 0.1, half=3.0),
     "rocks": lambda rover: rocky(3),
     "relief": lambda rover: fractal(2),
-    "step": lambda rover: step(0.5 * rover.wheel.radius),
+    "step": lambda rover: drive_ground("step", 0.5 * rover.wheel.radius),
 }
 """Makers of the grounds without errors."""
 
@@ -58,13 +53,9 @@ def arc_across(seed: int, size: float, count: int = 24) -> np.ndarray:
 
 
 def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterator[Terrain]:
-    """Yield maps with random height errors of the given standard deviations.
+    """Yield maps with random height errors by the layer `elevation_std` of a map.
 
-    Args:
-        terrain: The map, with a layer `elevation_std`.
-        length: Correlation length [m], at which the correlation is 1/e; 0: independent errors.
-        count: Number of maps.
-        seed: Seed of the random numbers.
+    Their correlation is 1/e at a length [m]; with 0 the error of each cell is its own.
     """
     rng = np.random.default_rng(seed)
     shape, width = terrain.elevation.shape, length / terrain.resolution / 2.0
@@ -216,9 +207,9 @@ def test_each_limit_is_held_against_its_bound_and_the_refusal_says_so(rover, cod
 
 def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
     """Just before its front wheels climb, noise decides on which level they stand."""
-    ground = with_std(step(1.6 * M2020.wheel.radius), 0.006)
+    ground = with_std(drive_ground("step", 1.6 * M2020.wheel.radius), 0.006)
     prediction, verdict = judge_path(
-        M2020, ground, poses_at(np.arange(-1.2, 0.0, 0.02), 0.05, 0.03)
+        M2020, ground, poses_at(np.arange(-1.5, -0.3, 0.02), 0.05, 0.03)
     )
     edges = prediction.bounds.status == BoundStatus.ON_EDGE
     assert 0 < edges.sum() < 0.2 * len(edges)

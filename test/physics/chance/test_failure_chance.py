@@ -16,11 +16,10 @@ from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.uncertainty import Uncertainty
-from support.grounds import make_terrain
+from support.grounds import make_terrain, plane, with_std
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import plane, with_std
 
 EXACT = Uncertainty(**{one.name: 0.0 for one in fields(Uncertainty)})
 FRICTION = 0.5

@@ -11,19 +11,16 @@ from hypothesis import strategies as st
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from support.grounds import make_terrain
+from support.grounds import bouldered, fractal, plane, raised, random_poses, rocky, smooth
 from support.paths import poses_at
 from support.project.checkout import TOP
-from support.reference_cases import reference_predictions, steered_predictions
-from support.rough_grounds import bouldered, fractal, plane, random_poses, rocky, smooth
-from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gap, wheel_gaps
+from support.reference_cases import STEERED, STRAIGHT, reference_predictions
+from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_gap, wheel_gaps
 from support.rovers import LSR1
 
 slopes = st.floats(-0.4, 0.4)
 both_sets = pytest.mark.parametrize(
-    ("predict", "count"),
-    [(reference_predictions, 81), (steered_predictions, 21)],
-    ids=["straight", "turned"],
+    ("files", "count"), [(STRAIGHT, 81), (STEERED, 21)], ids=["straight", "turned"]
 )
 
 
@@ -34,11 +31,9 @@ def waypoints_of(predictions):
 
 
 @both_sets
-def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_them(
-    predict, count
-):
+def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_them(files, count):
     errors, angles = [], []
-    for case, prediction in predict():
+    for case, prediction in reference_predictions(files):
         assert prediction.settled.all(), case.label
         away = prediction.wheel_centres - case.wheel_centres
         errors.append(np.linalg.norm(away, axis=2).ravel())
@@ -52,7 +47,7 @@ def test_all_cases_settle_with_wheels_attitude_and_suspension_where_mujoco_has_t
 
 
 def test_turned_wheels_touch_by_an_independent_dense_look_over_their_whole_width():
-    cases = list(waypoints_of(steered_predictions()))[::4]  # a look takes long
+    cases = list(waypoints_of(reference_predictions(STEERED)))[::4]  # a look takes long
     gaps = np.concatenate([wheel_gaps(LSR1, case.terrain, p, i) for case, p, i in cases])
     assert gaps.size == 36
     assert gaps.max() <= 3e-4 and gaps.min() >= -1e-3
@@ -60,9 +55,8 @@ def test_turned_wheels_touch_by_an_independent_dense_look_over_their_whole_width
 
 def test_a_peak_below_a_wheel_is_found_wherever_it_is():
     """Also between the circles of the wheel that are looked at first."""
-    heights = np.zeros((241, 241))
-    heights[120 - 31, 120] = 0.03  # below the middle right wheel
-    ground = Terrain(heights, 0.01, (-1.2, -1.2))
+    level = Terrain(np.zeros((241, 241)), 0.01, (-1.2, -1.2))
+    ground = raised(level, (120 - 31, 120), 0.03)  # below the middle right wheel
     x = LSR1.suspension.wheels["middle"][0]
     aside = 0.45 * LSR1.wheel.width * np.linspace(-1.0, 1.0, 19)
     prediction = judge_poses(LSR1, ground, poses_at(-x, aside), np.zeros(19))[0]
@@ -111,8 +105,8 @@ def test_999_of_1000_wheels_touch_within_a_tenth_of_a_millimetre_and_none_is_in_
     gaps = []
     for ground, prediction in rough_predictions(seeds):
         for k, i in enumerate(np.flatnonzero(prediction.settled)[::EVERY]):
-            centre, axis = prediction.wheel_centres[i, k % 6], wheel_axes(LSR1, prediction, i)
-            gaps.append(wheel_gap(LSR1, ground, centre, axis[k % 6]))
+            axis = place_rover(LSR1, prediction, i).axles[k % 6]
+            gaps.append(wheel_gap(LSR1, ground, prediction.wheel_centres[i, k % 6], axis))
     gaps = np.array(gaps)
     assert gaps.size >= 39 * seeds
     assert (np.abs(gaps) <= 1e-4).mean() >= 0.999
@@ -137,9 +131,9 @@ def test_no_rim_sinks_into_cells_twenty_times_as_large_as_the_wheel():
 
 
 @both_sets
-def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
-    for case, prediction, i in waypoints_of(predict()):
-        points, axes = prediction.contact_points[i], wheel_axes(LSR1, prediction, i)
+def test_contact_points_lie_on_the_wheels_and_on_the_ground(files, count):
+    for case, prediction, i in waypoints_of(reference_predictions(files)):
+        points, axes = prediction.contact_points[i], place_rover(LSR1, prediction, i).axles
         from_centre = points - prediction.wheel_centres[i]
         along = np.einsum("wk,wk->w", from_centre, axes)
         radial = np.linalg.norm(from_centre - along[:, None] * axes, axis=1)
@@ -166,11 +160,9 @@ def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw)
     assert foot[2] == pytest.approx(slope_x * foot[0] + slope_y * foot[1] + height, abs=2.0 * GAP)
 
 
-def known_to_the_left_of(edge: float) -> Terrain:
-    return make_terrain(lambda x, y: np.where(x > edge, np.nan, 0.0), 0.04, 1.2)
-
-
 LEVEL = plane(0.0, 0.0)
+LEFT = raised(LEVEL, np.s_[:, 46:], np.nan)
+"""Ground that is known up to x = 0.6."""
 REACH = LEVEL.bounds[1] - 0.5
 """Where the front wheels touch the last cell of the map."""
 
@@ -178,9 +170,10 @@ REACH = LEVEL.bounds[1] - 0.5
 @pytest.mark.parametrize(
     ("ground", "x", "status"),
     [
-        (known_to_the_left_of(0.6), 0.0, PoseStatus.SETTLED),
-        (known_to_the_left_of(0.6), 0.3, PoseStatus.UNKNOWN_GROUND),
-        (known_to_the_left_of(1.0), 0.95, PoseStatus.OFF_MAP),  # comes before unknown ground
+        (LEFT, 0.0, PoseStatus.SETTLED),
+        (LEFT, 0.3, PoseStatus.UNKNOWN_GROUND),
+        # Off the map comes before unknown ground.
+        (raised(LEVEL, np.s_[:, 56:], np.nan), 0.95, PoseStatus.OFF_MAP),
         (LEVEL, REACH - 0.001, PoseStatus.SETTLED),
         (LEVEL, REACH + 0.001, PoseStatus.OFF_MAP),
         (LEVEL, 40.0, PoseStatus.OFF_MAP),
@@ -205,23 +198,15 @@ def test_poses_that_do_not_settle_have_nan_for_every_number():
             assert np.isfinite(values[0]).all() and np.isnan(values[1]).all(), one.name
 
 
-HALF, RESOLUTION = 60, 0.02
 COARSE = 0.05 * (-3.5 + np.arange(9.0))
 """Heights of a slope on cells larger than the belly [m]."""
-
-
-def unknown_around(rows: int, columns: int) -> Terrain:
-    """Return level ground with so many unknown cells to each side of the middle of the rover."""
-    z = np.zeros((2 * HALF + 1, 2 * HALF + 1))
-    z[HALF - rows : HALF + rows + 1, HALF - columns : HALF + columns + 1] = np.nan
-    return Terrain(z, RESOLUTION, (-HALF * RESOLUTION, -HALF * RESOLUTION))
 
 
 @pytest.mark.parametrize(
     ("ground", "clearance"),
     [
-        (unknown_around(0, 0), 0.24),  # unknown cells are passed over
-        (unknown_around(11, 16), np.nan),
+        (raised(LEVEL, (30, 30), np.nan), 0.24),  # unknown cells are passed over
+        (raised(LEVEL, np.s_[25:36, 22:39], np.nan), np.nan),  # all cells below the belly
         (Terrain(np.zeros((9, 9)), 1.0, (-3.5, -3.5)), 0.24),
         (Terrain(np.tile(COARSE, (9, 1)), 1.0, (-3.5, -3.5)), 0.24 / np.cos(np.arctan(0.05))),
     ],

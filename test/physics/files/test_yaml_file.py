@@ -93,11 +93,8 @@ def test_impossible_merges_and_references_and_deep_nesting_are_refused_at_once()
     assert time.perf_counter() - start < 30.0
 
 
-def test_a_large_file_is_refused_before_it_is_parsed(tmp_path):
+def test_a_large_file_and_bytes_that_are_no_text_are_refused_before_they_are_parsed(tmp_path):
     text = error_of(tmp_path, "- 1\n" * 1_000_000)
     assert text == "is larger than 100000 bytes, the most that is read"
-
-
-def test_bytes_that_are_no_text_are_refused(tmp_path):
     assert "special characters are not allowed" in error_of(tmp_path, "a: \0")
     assert "not a text file in UTF-8" in error_of(tmp_path, "a: \ud800")

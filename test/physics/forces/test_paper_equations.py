@@ -10,7 +10,7 @@ test_equilibrium.py.
 import numpy as np
 
 from rover_physics import PathPrediction, Rover, judge_path
-from support.rough_grounds import fractal, random_poses, rocky, smooth
+from support.grounds import fractal, random_poses, rocky, smooth
 from support.rover_geometry import attitude_of
 from support.rovers import LSR1
 

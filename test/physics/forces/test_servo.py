@@ -20,9 +20,9 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.status import Stall
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
+from support.grounds import fractal, plane, random_poses, rocky, smooth
 from support.paths import poses_at
 from support.reference_drives import drive_ground, drive_path
-from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
 from support.rovers import FIXED, LSR1, M2020
 
@@ -31,10 +31,6 @@ SOFT = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
 SAND = replace(SERVO, soil="lete_sand", max_torque=20.0)
 POSE = np.zeros((1, 3))
 soils = st.sampled_from(SOFT)
-
-
-def with_droop(rover, droop):
-    return replace(rover, wheel=replace(rover.wheel, servo_droop=droop))
 
 
 def servos_at(rover, ground, poses, options, curvature):

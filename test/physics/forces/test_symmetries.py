@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import Rover, SweepOptions, Terrain, judge_paths, judge_poses
-from support.paths import arc_of, poses_at
-from support.rough_grounds import (
+from support.grounds import (
     bouldered,
     enlarged,
     random_poses,
@@ -19,6 +18,7 @@ from support.rough_grounds import (
     smooth,
     with_std,
 )
+from support.paths import arc_of, poses_at
 from support.rover_geometry import ANGLE, GAP, turned_round
 from support.rovers import LSR1, M2020, SIMILAR, similar
 

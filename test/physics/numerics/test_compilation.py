@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kernels compile in other processes, which end with the one that started them."""
 
+import importlib
 import signal
 import subprocess
 import sys
@@ -38,14 +39,6 @@ def endless():
     while True:
         time.sleep(0.01)
 """
-PROGRAM = """
-from rover_physics.compilation import Compilation
-import some_kernels
-
-steps = [some_kernels.first, some_kernels.second]
-Compilation(steps).run(lambda name: print(name, end=" "))
-print(sum(some_kernels.twice.whole.stats.cache_hits.values()))
-"""
 PARENT = """
 from rover_physics.compilation import Compilation
 import some_kernels
@@ -67,21 +60,9 @@ def folder(tmp_path, monkeypatch):
     sys.modules.pop("some_kernels", None)
 
 
-def start(program: str, **options) -> subprocess.Popen:
-    command = [sys.executable, "-c", program]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **options)
-
-
 def wait_for_process(folder: Path) -> int:
     file = folder / "pid"
     return int(wait_until(lambda: file.exists() and file.read_text(), "a process", 60.0))
-
-
-@pytest.mark.long
-def test_a_process_compiles_what_is_missing_and_this_one_loads_it(folder):
-    for output in ("first second 2\n", "2\n"):
-        with start(PROGRAM) as process:
-            assert process.communicate(timeout=120)[0] == output
 
 
 def test_a_background_compilation_can_be_closed(folder):
@@ -95,7 +76,7 @@ def test_a_background_compilation_can_be_closed(folder):
 
 
 def test_the_process_ends_with_its_parent_even_if_that_is_killed(folder):
-    with start(PARENT, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen([sys.executable, "-c", PARENT], stderr=subprocess.DEVNULL) as process:
         pid = wait_for_process(folder)
         process.send_signal(signal.SIGKILL)
         process.wait(60.0)
@@ -103,11 +84,12 @@ def test_the_process_ends_with_its_parent_even_if_that_is_killed(folder):
 
 
 @pytest.mark.long
-def test_groups_are_compiled_by_several_processes_and_errors_are_raised(folder):
-    import some_kernels
-
-    names, steps = [], [some_kernels.first, some_kernels.second]
-    compile_groups([[step] for step in steps], names.append, 2)
-    assert sorted(names) == ["first", "second"]
+def test_other_processes_compile_what_is_missing_this_one_loads_it_and_errors_are_raised(folder):
+    for missing in (["first", "second"], []):
+        made, names = importlib.import_module("some_kernels"), []
+        compile_groups([[made.first], [made.second]], names.append, 2)
+        assert sorted(names) == missing
+        assert sum(made.twice.whole.stats.cache_hits.values()) == 2
+        del sys.modules["some_kernels"]
     with pytest.raises(AttributeError, match="third"):
-        compile_groups([[some_kernels.third], steps], names.append, 2)
+        compile_groups([[made.third], [made.first]], names.append, 2)

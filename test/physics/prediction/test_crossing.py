@@ -9,11 +9,10 @@ import pytest
 from rover_physics import SweepOptions, Terrain, judge_path, judge_paths
 from rover_physics.prediction import crossing
 from rover_physics.prediction.drops import FACE
-from support.grounds import make_terrain
+from support.grounds import make_terrain, plane, rocky, smooth
 from support.paths import poses_at
 from support.predictions import assert_same
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import plane, rocky, smooth
 from support.rover_geometry import balance_residuals
 from support.rovers import LSR1
 

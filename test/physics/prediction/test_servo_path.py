@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path, judge_paths
-from support.grounds import make_terrain
+from support.grounds import fractal, make_terrain, plane
 from support.paths import arc_of, poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import fractal, plane
 from support.rovers import LSR1
 
 ROVER = unlimited(LSR1)

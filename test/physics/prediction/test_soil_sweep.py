@@ -8,8 +8,8 @@ import pytest
 
 from rover_physics import SweepOptions, Terrain, judge_path
 from rover_physics.forces.soil import SoilWheel, effective_friction, pack_soils, solve_wheel
+from support.grounds import plane, random_poses, smooth
 from support.paths import poses_at
-from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import turned_round
 from support.rovers import LSR1
 
@@ -26,11 +26,14 @@ def with_soil(ground: Terrain, *names: str, index=0) -> Terrain:
     return replace(ground, soil=np.ascontiguousarray(soil), soil_names=names)
 
 
-@pytest.mark.parametrize(("soil", "policy"), [("lunar_nominal", "equal"), ("dry_sand", "optimal")])
+@pytest.mark.parametrize(
+    ("soil", "policy"), [(None, "equal"), ("lunar_nominal", "equal"), ("dry_sand", "optimal")]
+)
 def test_every_wheel_obeys_the_model_of_its_soil_under_its_own_load(soil, policy):
     options = SweepOptions(soil=soil, policy=policy)
     prediction = judge_path(LSR1, smooth(2), random_poses(3, 4, 0.6), options)[0]
-    wheel, ground = SoilWheel(LSR1.wheel.radius, LSR1.wheel.width, 0.8), pack_soils((soil,))[1]
+    wheel = SoilWheel(LSR1.wheel.radius, LSR1.wheel.width, 0.8)
+    ground = pack_soils(default=soil)[0]
     for place in np.ndindex(4, 6):
         at = {name: float(getattr(prediction, name)[place]) for name in (*FORCES, *ON_SOIL)}
         found = solve_wheel(ground, wheel, *(at[name] for name in FORCES))

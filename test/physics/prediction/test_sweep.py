@@ -25,11 +25,18 @@ from rover_physics.numerics import interruption
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits
-from support.grounds import gap, make_terrain, waves
-from support.grounds import rocky as low_rock
+from support.grounds import (
+    gap,
+    make_terrain,
+    plane,
+    random_poses,
+    rocky,
+    scaled_for,
+    waves,
+    with_std,
+)
 from support.paths import poses_at
 from support.predictions import assert_same
-from support.rough_grounds import plane, random_poses, rocky, scaled_for, with_std
 from support.rover_geometry import place_rover
 from support.rovers import LSR1, M2020
 
@@ -132,7 +139,7 @@ def test_a_way_costs_more_than_the_way_back_by_the_weight_that_it_lifts(height, 
     assert spent[0] - spent[1] == pytest.approx(lifted(rover, way), abs=0.005 * sum(spent))
 
 
-@pytest.mark.parametrize(("ground", "shape"), [(low_rock, (5, 8)), (gap, (60, 50))])
+@pytest.mark.parametrize(("ground", "shape"), [(waves, (5, 8)), (gap, (60, 50))])
 def test_scores_are_those_of_a_sweep_and_its_verdict_on_one_thread_and_on_several(ground, shape):
     terrain = make_terrain(ground)
     (xmin, xmax, ymin, ymax), rng = terrain.bounds, np.random.default_rng(4)
@@ -171,7 +178,7 @@ def test_a_map_is_swept_cell_by_cell(monkeypatch):
 
 
 def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
-    exact, poses = make_terrain(low_rock), line(-2.5, 2.5, 60) + poses_at(0.0, -0.5)
+    exact, poses = rocky(0), line(-2.5, 2.5, 60) + poses_at(0.0, -0.5)
     asked = [
         (terrain, poses, SweepOptions(policy=policy))
         for terrain in (exact, with_std(exact, 0.002))

@@ -10,7 +10,7 @@ from rover_physics import SweepOptions, judge_path
 from rover_physics.errors import ModelError
 from rover_physics.rover.manipulator import arm_angles, body_mass_and_com, link_points
 from rover_physics.traversability.verdict import hold_against_limits
-from support.rough_grounds import plane
+from support.grounds import plane
 from support.rovers import LSR1, M2020
 
 ARM = LSR1.manipulator

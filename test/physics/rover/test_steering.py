@@ -109,12 +109,6 @@ def test_wheels_turn_at_their_rate_and_the_drive_waits_for_them():
     assert moving[0] == pytest.approx(np.cos(STAND_ERROR), abs=0.01)
 
 
-def test_fixed_wheels_are_never_waited_for():
-    drive = SteeredDrive(FIXED)
-    aims = drive.aim(0.06, 0.1)
-    assert not aims.angles.any() and drive.share(np.zeros(6), aims.angles) == 1.0
-
-
 def test_joints_that_do_not_reach_what_is_planned_are_refused():
     with pytest.raises(ModelError, match=r"reach 0\.52 rad.*up to 1\.57 rad.*at most 0\.52"):
         check_joint_limit(LSR1, 0.52)

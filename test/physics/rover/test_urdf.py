@@ -22,7 +22,7 @@ from rover_physics.rover.urdf.read_rover import Levelling, ReadRover, rover_from
 from rover_physics.rover.urdf.robot import parse_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from support.project.checkout import TOP
-from support.rover_geometry import place_rover, wheel_axes
+from support.rover_geometry import place_rover
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -353,4 +353,4 @@ def test_mujoco_has_masses_and_wheels_of_the_urdf_where_the_model_has_them(name,
     centres = np.array([body.xpos for body in bodies])
     np.testing.assert_allclose(centres, placed.wheels, atol=1e-9)
     axes = np.array([body.xmat.reshape(3, 3)[:, 1] for body in bodies])
-    np.testing.assert_allclose(axes, wheel_axes(rover, posed, 0), atol=1e-9)
+    np.testing.assert_allclose(axes, placed.axles, atol=1e-9)

@@ -13,7 +13,7 @@ from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from support.best_torques import can_stand
-from support.rough_grounds import fractal, plane, random_poses
+from support.grounds import fractal, plane, random_poses
 from support.rover_geometry import balance_matrix, place_rover
 from support.rovers import LSR1, M2020
 from support.traction_states import state_of
@@ -53,9 +53,8 @@ def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
     x = rows.force_unit * rows.complete(np.linspace(-0.1, 0.1, 6))
     lateral = rows.lateral_forces(x)
     forces = np.column_stack([x[TRACTIONS], lateral, x[LOADS]])
-    placed = place_rover(
-        rover, judge_path(rover, plane(0.0, 0.0, half=4.0), [[0.0, 0.0, 0.0]])[0], 0
-    )
+    standing = judge_path(rover, plane(0.0, 0.0, half=4.0), [[0.0, 0.0, 0.0]])[0]
+    placed = place_rover(rover, standing, 0)
     masses, centres, *_ = zip(*placed.masses, strict=True)
     com = np.average(centres, axis=0, weights=masses)
     places = placed.wheels - [0.0, 0.0, rover.wheel.radius]

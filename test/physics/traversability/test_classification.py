@@ -19,10 +19,9 @@ from rover_physics.traversability.classification import (
     deciding_waypoint,
 )
 from rover_physics.traversability.verdict import hold_against_limits
-from support.grounds import make_terrain
+from support.grounds import bowl, fractal, make_terrain, plane, random_poses, rocky, with_std
 from support.paths import poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import bowl, fractal, plane, random_poses, rocky, with_std
 from support.rovers import LSR1
 
 POSE = [[0.0, 0.0, 0.0]]

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path
-from support.grounds import make_terrain
+from support.grounds import bowl, make_terrain
 from support.paths import poses_at
 from support.reference_drives import drive_ground
-from support.rough_grounds import bowl
 from support.rovers import LSR1
 
 DEEP_DROPS = replace(LSR1, limits=replace(LSR1.limits, wheel_drop=1.0))
@@ -46,13 +45,9 @@ def test_traction_control_gets_out_of_what_equal_torques_and_weak_motors_are_tra
 
 
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
-def test_a_shallow_hole_traps_nobody(policy):
+def test_a_shallow_hole_and_a_step_down_to_open_ground_are_no_traps(policy):
+    """Back up the step may be impossible, but the way on is open."""
     assert verdict_on(SHALLOW, -1.6, 0.1, policy=policy).traversable
-
-
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_a_step_down_to_open_ground_is_no_trap(policy):
-    """Back up may be impossible, but the way on is open."""
     assert verdict_on(DOWN, -1.2, 1.2, policy=policy).traversable
     assert not verdict_on(UP, -1.2, 1.2, max_torque=0.5).traversable
 

@@ -28,8 +28,8 @@ from rover_physics.prediction.sweep import predict_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from rover_planner.planning.path_query import Candidate
+from support.grounds import plane, raised, with_std
 from support.paths import poses_at
-from support.rough_grounds import plane, with_std
 from support.rovers import LSR1
 
 POSES = poses_at(np.linspace(-0.2, 0.2, 5))
@@ -151,9 +151,8 @@ def test_a_bound_that_is_no_number_is_a_refusal():
 
 
 def test_only_the_clearance_over_unknown_ground_may_be_unknown():
-    elevation = np.zeros((121, 121))
-    elevation[57:64] = math.nan  # the wheels' tracks at y = -0.31 and 0.31 m stay known
-    ground = Terrain(elevation, 0.05, (-3.0, -3.0))
+    # The wheels' tracks at y = -0.31 and 0.31 m stay known.
+    ground = raised(LEVEL, np.s_[27:34], math.nan)
     narrow = replace(LSR1, belly=replace(LSR1.belly, y=(-0.1, 0.1)))
     for asked in (ground, with_std(ground, 1e-4)):
         prediction, verdict = judge_path(narrow, asked, POSES)

@@ -6,8 +6,8 @@ import pytest
 
 import rover_physics
 from rover_physics import SweepOptions, judge_path, judge_poses
+from support.grounds import smooth
 from support.paths import poses_at
-from support.rough_grounds import smooth
 from support.rovers import LSR1
 
 GROUND, POSES = smooth(1), poses_at(np.linspace(-0.2, 0.2, 9))

@@ -16,11 +16,10 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure
 from rover_physics.traversability.verdict import hold_against_limits
-from support.grounds import make_terrain
+from support.grounds import bouldered, bowl, fractal, make_terrain, rocky, scaled_for, with_std
 from support.paths import arc_of, poses_at
 from support.predictions import assert_same
 from support.reference_drives import drive_ground, drive_path
-from support.rough_grounds import bouldered, bowl, fractal, rocky, scaled_for, with_std
 from support.rovers import LSR1 as ROVER
 
 GROUND = bouldered(3, half=6.0, count=600)
@@ -74,16 +73,6 @@ def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(cours
     assert_same(swept.prediction, whole.cut(count))
     assert_same(swept.prediction.between, whole.cut(count).between)
     assert stopped.codes == verdict.codes[:count]
-
-
-def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monkeypatch):
-    """A sweep that took the end of a block for that of the path would refuse the fall."""
-    poses = straight(-3.0)
-    _, whole = judge_path(ROVER, GROUND, poses)
-    assert whole.traversable and whole.max_wheel_drop > 0.0
-    for block in (1, 2, 3, 5, 7, 11):
-        monkeypatch.setattr(sweep, "FIRST_BLOCK", block)
-        assert judge_path(ROVER, GROUND, poses, stop_at_failure=True)[1].traversable
 
 
 def steps_down(step: float) -> Terrain:
@@ -202,23 +191,21 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
     assert exposure == pytest.approx(prediction.time[-1], rel=0.01)
 
 
-GROUNDS = (bouldered, rocky, fractal)
-
-
-def random_course(rover, seed: int) -> tuple[Terrain, np.ndarray]:
+def random_course(rover, make, seed: int) -> tuple[Terrain, np.ndarray]:
     """Return a rough ground in the rover's size, and a straight path over it in any direction."""
-    rng, ground = np.random.default_rng(seed), GROUNDS[seed % len(GROUNDS)](seed)
+    rng, ground = np.random.default_rng(seed), make(seed)
     yaw, (x, y) = rng.uniform(-np.pi, np.pi), rng.uniform(-0.4, 0.4, 2)
     return scaled_for(rover, ground, straight(y, 1.0, x, yaw))
 
 
 @pytest.mark.parametrize(
-    ("name", "seed", "friction"), [("lsr1", 34, 1.0), ("lsr1", 830, 0.3), ("m2020", 230, 0.3)]
+    ("name", "make", "seed", "friction"),
+    [("lsr1", rocky, 34, 1.0), ("lsr1", fractal, 830, 0.3), ("m2020", fractal, 230, 0.3)],
 )
-def test_twice_as_many_waypoints_change_no_verdict(name, seed, friction):
+def test_twice_as_many_waypoints_change_no_verdict(name, make, seed, friction):
     """Each of them hid a peak of friction, or the begin of a fall, between its waypoints."""
     rover = load_rover(name)
-    terrain, path = random_course(rover, seed)
+    terrain, path = random_course(rover, make, seed)
     middles = 0.5 * (path[1:] + path[:-1])
     refined = np.insert(path, np.arange(1, len(path)), middles, axis=0)
     coarse, fine = (

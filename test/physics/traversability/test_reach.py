@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rover_physics import SweepOptions, judge_path, judge_reach
 from rover_physics.errors import ModelError
 from rover_physics.rover.manipulator import arm_angles, inverse_kinematics, link_points
-from support.rough_grounds import plane, smooth
+from support.grounds import plane, smooth
 from support.rover_geometry import attitude_of
 from support.rovers import LSR1, M2020
 

@@ -11,8 +11,8 @@ from rover_physics import PoseStatus, judge_path
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import numbers_of
 from rover_physics.traversability.verdict import hold_against_limits
+from support.grounds import plane
 from support.paths import poses_at
-from support.rough_grounds import plane
 from support.rovers import LSR1
 
 POSES = poses_at(np.linspace(-0.2, 0.2, 5))

@@ -14,6 +14,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.answering.judgement import refusal
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.snapshot import GivenPath
+from rover_planner.planning.search.judge import PathJudge
 from support.grounds import make_terrain, wall_at
 from support.services import make_service
 
@@ -56,19 +57,17 @@ def test_the_report_says_what_the_model_found(full):
     told, verdict = full.report.to_dict(), full.complete().candidate.verdict
     for name, value in verdict.to_dict().items():
         assert told[name] == (value if value != [] else [None] * told["waypoints"])
-    np.testing.assert_array_equal(
-        told["failure_pose"], full.candidate.poses[verdict.first_failure]
-    )
+    assert told["failure_pose"] == full.candidate.poses[verdict.first_failure].tolist()
     assert told["traversability_class"] == "impassable"
     assert told["class_waypoint"] == told["traversability_classes"].index("impassable")
     assert told["goal"] == [2.0, 0.0, 0.0] and told["candidates"] == 2
 
 
 def test_without_time_for_the_rest_the_report_ends_at_the_failure(full, monkeypatch):
-    def no_time(_poses):
+    def no_time(_judge, _poses):
         raise QuestionStoppedError("too_slow", "no time is left")
 
-    monkeypatch.setattr(full.judge, "check", no_time)
+    monkeypatch.setattr(PathJudge, "check", no_time)
     told = replace(full).complete().report.to_dict()
     assert told["reason"] == full.reason and told["waypoints"] == len(full.candidate.poses)
     assert len(told["codes"]) == told["first_failure"] + 1
@@ -77,9 +76,6 @@ def test_without_time_for_the_rest_the_report_ends_at_the_failure(full, monkeypa
 
 
 def test_a_refusal_says_why_and_nothing_of_a_path():
-    assert refusal("no_map", "no map was received yet").report.to_dict() == {
-        "traversable": False,
-        "code": "no_map",
-        "reason": "no map was received yet",
-        "first_failure": -1,
-    }
+    told = refusal("no_map", "no map yet").report.to_dict()
+    why = {"traversable": False, "code": "no_map", "reason": "no map yet", "first_failure": -1}
+    assert told == why

@@ -33,9 +33,8 @@ from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSE
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
-from support.grounds import make_terrain
+from support.grounds import make_terrain, plane
 from support.paths import poses_at
-from support.rough_grounds import plane
 from support.services import make_service
 
 PLACE = MarkedPlace(1.5, 0.0, 0.4, "wheels turn and the rover stays", "2026-11-25 04:00:00 UTC")
@@ -147,9 +146,8 @@ def test_goals_near_a_goal_are_over_seen_ground_and_outside_marked_places():
     marked = MarkedPlaces((replace(PLACE, x=2.4, radius=0.4),))
     options, check = PathQueryOptions(accepted_chance=1.0), UnobservedCheck(seen, REFUSE)
     judge = PathJudge(Site(rover, ground, options, check, marked))
-    goals = np.array(
-        [goal for ring in judge.goals_near(np.array(START), hole, 0.8) for goal in ring]
-    )
+    rings = judge.goals_near(np.array(START), hole, 0.8)
+    goals = np.array([goal for ring in rings for goal in ring])
     assert 8 < len(goals) < 32
     assert not seen.refused_below(rover, goals, REFUSE).any()
     assert np.hypot(*(goals[:, :2] - (2.4, 0.0)).T).min() >= 0.4

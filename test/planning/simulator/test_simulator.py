@@ -19,9 +19,8 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation
-from support.grounds import make_terrain, waves
-from support.paths import arc_of
-from support.rough_grounds import enlarged, plane, rocky
+from support.grounds import enlarged, make_terrain, plane, raised, rocky, waves
+from support.paths import arc_of, poses_at
 from support.rovers import FIXED, LSR1, similar
 
 STEP, SPEED = 0.02, 0.06
@@ -262,8 +261,7 @@ def test_a_rover_of_any_size_and_speed_backs_off_by_as_many_wheel_radii(size, no
 
 
 def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_not_see_it():
-    hole = lambda x, y: waves(x, y) + np.where(np.hypot(x, y) < 0.3, np.nan, 0.0)  # noqa: E731
-    ground = make_terrain(hole, half=3.0)
+    ground = raised(WAVY, np.s_[55:66, 55:66], np.nan)
     given = RoverSimulatorParameters(start_x=-0.6)
     simulation = Simulation(LSR1, ground, given)
     drive(simulation.plant, 13.0)
@@ -301,10 +299,6 @@ def test_a_wall_hides_what_is_behind_it_unless_nothing_hides():
     assert np.isfinite(look(ground, occlusion=False).elevation_at(1.5, 0.0))
 
 
-def line(start, end, yaw, count=30):
-    return np.column_stack([np.linspace(start, end, count), np.full(count, yaw)])
-
-
 # Wheels that steer
 
 LOOK_AHEAD = 0.4
@@ -312,9 +306,8 @@ REACH = float(np.hypot(0.4, 0.31))
 
 
 def turn_and_go(angle, length):
-    spot = line((0.0, 0.0), (0.0, 0.0), np.linspace(0.0, angle, 40), 40)
-    end = length * np.cos(angle), length * np.sin(angle)
-    return np.vstack([spot, line((0.0, 0.0), end, angle, 40)[1:]])
+    spot = poses_at(0.0, 0.0, np.linspace(0.0, angle, 40))
+    return np.vstack([spot, arc_of(0.0, np.linspace(0.0, length, 40), angle)[1:]])
 
 
 def drive_along(plant, path):
@@ -375,7 +368,7 @@ def test_fixed_wheels_have_no_steering_joints_and_skid_in_curves(engine):
 def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
     plant = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0))
     back = np.array([1.0, 0.0, 0.0]) + arc_of(-1.0, np.linspace(0.0, -0.8, 100))  # to the right
-    path = np.vstack([line((0.0, 0.0), (1.0, 0.0), 0.0), back[1:]])
+    path = np.vstack([poses_at(np.linspace(0.0, 1.0, 30)), back[1:]])
     away, poses, _ = drive_along(plant, path)
     assert away < 0.1
     corner = np.argmax(poses[:, 0])
