@@ -88,8 +88,7 @@ def test_slips_before_a_line_do_not_bound_the_ground_that_is_proved_to_be_anothe
 
 
 def test_on_ground_that_may_have_changed_since_the_measured_friction_stays_and_is_less_sure():
-    ground = FrictionFilter(TOLD)
-    slip_on(ground, 0.35, 10)
+    ground = slip_on(0.35, 10)
     before = ground.estimate
     ground.drive(1.5)
     after = ground.estimate
