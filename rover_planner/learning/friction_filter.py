@@ -46,9 +46,9 @@ class FrictionEstimate:
 
     mean: float
     """Mean: of the told friction given the bound while nothing has slipped; else of what was
-    measured, whatever was told."""
+    measured, whatever was told, as if the ground had not changed since."""
     std: float
-    """Standard deviation of the same."""
+    """Standard deviation about it; the ground may have changed."""
     low: float
     """Lower end of the 95 % interval; while nothing has slipped, what the wheels proved."""
     high: float | None
@@ -113,10 +113,12 @@ class FrictionFilter:
     def estimate(self) -> FrictionEstimate:
         """Mean, standard deviation and interval."""
         self._doubt()
-        is_bounded = self._chances[self._slips >= ENOUGH].sum() > 0.5
+        measured = self._slips >= ENOUGH
+        is_bounded = self._chances[measured].sum() > 0.5
         chances = self._chances / self._prior if is_bounded else self._chances
         chances = chances / chances.sum()
-        mean = float(chances @ GRID)
+        likely = np.where(measured, chances, 0.0) if is_bounded else chances
+        mean = float(likely @ GRID / likely.sum())
         spread = np.hypot(np.sqrt(max(float(chances @ (GRID - mean) ** 2), 0.0)), COMMON * mean)
         below = _widening() @ chances
         low, high = (float(np.interp(p, below, GRID)) for p in (1.0 - BOUNDED, BOUNDED))

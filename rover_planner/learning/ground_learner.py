@@ -59,10 +59,11 @@ MOST_STICKING = 0.3
 and slips by turns; its mean shear is then below the friction."""
 MAX_UNSTEADY = 0.1
 """Acceleration of the treads, over gravity, from which a window does not count."""
-SAME_PLACE = 0.5
+SAME_PLACE = 1.0
 """Distance of a wheel, over its radius, within which its measurements are not independent."""
-AT_A_PLACE = 1.0
-"""Number of independent measurements that a wheel makes at one place."""
+AT_A_PLACE = 2.0
+"""Number of independent measurements that a wheel makes at one place, however long it is there:
+half of the variance of their errors is common."""
 SAME_TIME = 0.2
 """Time within which its measurements are not independent, either [s]."""
 LEAST_NOISE, FLUCTUATION_NOISE = 0.10, 0.4
@@ -177,6 +178,7 @@ class GroundLearner:
         self._forward = np.ones(WHEEL_COUNT)
         self._slipping = np.zeros(WHEEL_COUNT, dtype=int)
         self._rates, self._place = np.zeros(WHEEL_COUNT), (-math.inf, 0.0, 0.0)
+        self._way = 0.0
         self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
         self._marked, self._mark_time = np.full((WHEEL_COUNT, 2), np.inf), -math.inf
         self._time = -math.inf
@@ -351,7 +353,7 @@ class GroundLearner:
         sticking = fluctuation * (1.0 - np.abs(window.ratio))
         is_clear = (sticking < MOST_STICKING) & (window.doubts < MOST_DOUBT * loads)
         tells = slips & counts & is_clear & (along > ALONG) & (window.slip * tractions > 0.0)
-        distance = abs(float(find_median(window.travel))) * elapsed
+        distance = self._go_on(window, elapsed)
         weights = self._weigh(window, tells, elapsed)
         beyond = abs(window.excess - float((window.tractions - tractions).sum()))
         most = np.maximum(GRIP_SHARE * np.abs(window.rolling), self._least_slip)
@@ -367,6 +369,7 @@ class GroundLearner:
             if len(told):
                 load, doubt = float(loads[told].sum()), window.doubts[told].sum()
                 noise = math.hypot(*noises[told], doubt, HIDDEN_SHARE * beyond) / load
+                noise = max(noise, _find_scatter(shears[told], loads[told]))
                 one.slip(float(shears[told].sum()) / load, noise, float(weights[told].mean()))
             held = np.sort((proved / np.maximum(loads, 1e-9))[proves & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong
@@ -383,15 +386,28 @@ class GroundLearner:
         fluctuation = spread / np.maximum(np.abs(torques), 1e-9)
         return fluctuation, spread / np.sqrt(count) / self._rover.wheel.radius
 
+    def _go_on(self, window: SlipWindow, elapsed: float) -> float:
+        """Return the distance to a new place [m], 0 before it is reached.
+
+        A rover that is stuck reaches none, however it trembles.
+        """
+        self._way += float(find_median(window.travel)) * elapsed
+        distance = abs(self._way)
+        if distance < SAME_PLACE * self._rover.wheel.radius:
+            return 0.0
+        self._way = 0.0
+        return distance
+
     def _weigh(self, window: SlipWindow, tells: Flags, elapsed: float) -> Floats:
-        """Return (6,) numbers of independent measurements; at one place they tell less and less.
+        """Return (6,) numbers of independent measurements; at one place they come to an end.
 
         What is wrong at a place, such as the slope of the contact, stays wrong.
         """
         away = np.hypot(*(window.places - self._spot).T) > SAME_PLACE * self._rover.wheel.radius
         self._spot = np.where(away[:, None], window.places, self._spot)
         self._here = np.where(away, 0.0, self._here)
-        weights = min(elapsed / SAME_TIME, 1.0) * np.exp(-self._here / AT_A_PLACE)
+        left = np.maximum(1.0 - self._here / AT_A_PLACE, 0.0)
+        weights = min(elapsed / SAME_TIME, 1.0) * left
         self._here = self._here + np.where(tells, weights, 0.0)
         return np.asarray(weights)
 
@@ -445,6 +461,16 @@ def _add(row, elapsed, rates, turned, blocks):
         block.turned[wheel] += turned[wheel]
         if np.isfinite(torque):
             block.squares[wheel] += torque * torque
+
+
+def _find_scatter(shears: Floats, loads: Floats) -> float:
+    """Return the relative standard deviation of the sum of the shears over that of the loads.
+
+    Wheels on one ground tell one friction; how they disagree tells the errors of their loads.
+    """
+    count, shear = len(shears), shears.sum()
+    rest = shears - loads * (shear / loads.sum())
+    return float(np.sqrt(count / max(count - 1, 1) * (rest @ rest)) / shear)
 
 
 def _find_change(values: Floats) -> float:

@@ -85,3 +85,12 @@ def test_slips_before_a_line_do_not_bound_the_ground_that_is_proved_to_be_anothe
     assert ground.estimate.high is not None
     ground.grip(0.45)
     assert ground.estimate.high is None
+
+
+def test_on_ground_that_may_have_changed_since_the_measured_friction_stays_and_is_less_sure():
+    ground = slip_on(0.35, 10)
+    before = ground.estimate
+    ground.drive(1.5)
+    after = ground.estimate
+    assert after.mean == pytest.approx(before.mean, rel=0.01)
+    assert after.std > 2.0 * before.std
