@@ -19,6 +19,7 @@ def by_name(table):
     return {name: shape for shape, names in table.items() for name in names.split()}
 
 
+ASSUMED = '{"rover": "lsr1", "policy": "equal"'
 SHAPES = by_name(
     {
         (): "traversable first_failure assumptions",
@@ -192,6 +193,8 @@ def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monke
     [
         ({"reason": None}, "no array reason; it has "),
         ({"assumptions": np.str_('{"rover": "lsr1"}')}, "assumptions are invalid"),
+        ({"assumptions": np.str_(ASSUMED + ', "friction": NaN}')}, "assumptions are invalid"),
+        ({"assumptions": np.str_(ASSUMED + ', "colour": "red"}')}, "assumptions are invalid"),
         ({"assumptions": np.float64(1.0)}, "assumptions is of type float64; it must hold texts"),
         ({"roll": np.float64(1.0)}, r"roll has shape \(\); it must be \(30,\)"),
         ({"settled": np.zeros(N)}, "settled is of type float64; it must hold bools"),

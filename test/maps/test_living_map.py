@@ -74,19 +74,18 @@ def test_a_loaded_map_survives_100_local_updates_to_the_bit():
 
 
 @pytest.mark.parametrize(
-    ("source", "maps"),
+    "maps",
     [
-        # height and time of each map, and which of the two heights wins
-        ("rear", [(0.1, 10.0, 0.1), (0.2, 9.0, 0.1), (0.3, 11.0, 0.3)]),
-        (TOPIC, [(0.1, 1e9, 0.1), (0.2, 3.0, 0.2)]),  # its clock went back
+        # height, source and time of each map, and which of them is in the cell from then on
+        [(0.1, TOPIC, 10.0, 0), (0.2, "rear", 9.0, 0), (0.3, "rear", 11.0, 2)],
+        [(0.1, TOPIC, 1e9, 0), (0.2, TOPIC, 3.0, 1)],  # its clock went back
     ],
 )
-def test_the_newer_height_wins_whichever_arrives_last(source, maps):
+def test_the_newer_height_wins_whichever_arrives_last(maps):
     living = LivingMap()
-    for k, (height, time, winner) in enumerate(maps):
-        living.merge(local_map((0.0, 0.0), height), source if k else TOPIC, time)
-        assert cell(living, 0.5, 0.5)[0] == winner
-    assert cell(living, 0.5, 0.5)[1:] == (source, maps[-1][1])
+    for height, source, time, winner in maps:
+        living.merge(local_map((0.0, 0.0), height), source, time)
+        assert cell(living, 0.5, 0.5) == maps[winner][:3]
 
 
 def test_the_surer_height_wins_until_it_has_aged():
@@ -234,6 +233,7 @@ def ground(seed=0, shape=(12, 15)) -> Terrain:
 @pytest.mark.parametrize("value", [9.0, np.nan])
 def test_a_cell_of_any_layer_that_differs_is_found(layer, value):
     assert not find_changes(ground(), ground()).any()
+    assert find_changes(ground(shape=(4, 5)), ground())[5:].all()  # the map has grown
     values = getattr(ground(), layer).copy()
     values[7, 2] = value
     found = find_changes(ground(), replace(ground(), **{layer: values}))

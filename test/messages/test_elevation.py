@@ -282,6 +282,11 @@ def test_a_bad_cloud_is_refused_by_name(cloud, text):
     assert text in refusal_of(cloud)
 
 
+@pytest.mark.parametrize("resolution", [1e-9, 1e7, np.nan, -1.0])
+def test_a_resolution_out_of_range_is_refused_with_the_range(resolution):
+    assert "or 0 to detect it, and from 1e-05 to 1e+06" in refusal_of(cloud_of(grid()), resolution)
+
+
 def test_a_few_points_do_not_take_the_memory_of_a_huge_map():
     ends = [[0.0, 0.0, 0.0], [0.0, 3e4, 0.0], [3e4, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
     tracemalloc.start()
@@ -328,7 +333,7 @@ def test_points_half_way_between_cells_stay_on_the_map(halves, resolution, origi
 
 @given(
     rows=st.lists(st.tuples(*[st.floats(width=32)] * 3), min_size=1, max_size=12),
-    resolution=st.sampled_from((0.0, 0.05, 1e-3, 1e5, 1e-9, 1e7, np.nan, -1.0)),
+    resolution=st.sampled_from((0.0, 0.05, 1e-3, 1e5)),
     kind=st.sampled_from(("<f4", "<f8")),
 )
 def test_every_set_of_points_becomes_a_terrain_or_a_refusal(rows, resolution, kind):

@@ -148,17 +148,17 @@ def test_a_window_that_rolls_keeps_what_stays_and_equals_a_new_map(rows, columns
 
 
 def test_the_same_map_judges_nothing_and_another_rover_option_or_grid_all_anew():
-    terrain = rough(1, (36, 40))
+    soil = {"soil": np.zeros((36, 40), np.int32), "soil_names": ("mars_simulant",)}
+    terrain = replace(rough(1, (36, 40)), **soil)
     hazards = judged(terrain, 1)
     hazards.take(RoverOnMap(LSR1, replace(terrain, elevation=terrain.elevation.copy()), OPTIONS))
     assert hazards.stale_count == 0
-    sand = {"soil": np.zeros((36, 40), np.int32), "soil_names": ("mars_simulant",)}
     for other in (
         RoverOnMap(M2020, terrain, OPTIONS),
         RoverOnMap(LSR1, terrain, replace(OPTIONS, friction=0.5)),
         RoverOnMap(LSR1, replace(terrain, origin=(-2.03, 1.0)), OPTIONS),
         RoverOnMap(LSR1, replace(terrain, friction=np.full((36, 40), 0.7)), OPTIONS),
-        RoverOnMap(LSR1, replace(terrain, **sand), OPTIONS),
+        RoverOnMap(LSR1, replace(terrain, soil_names=("dry_sand",)), OPTIONS),
     ):
         hazards.take(RoverOnMap(LSR1, terrain, OPTIONS))
         hazards.work(600.0)

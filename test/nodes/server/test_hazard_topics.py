@@ -66,11 +66,11 @@ def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client):
     worst, best, first = hear_grids(client, "worst", "best", "heading_1")
     for grids in (worst, best, first):
         wait_until(lambda grids=grids: is_free(grids), "the whole map", 60.0)
-    assert worst[-1].header.frame_id == "map"
-    assert (worst[-1].info.height, worst[-1].info.width) == mapping.service.terrain.elevation.shape
-    assert (
-        cells(worst[-1], y=(-3.0, -2.9)) == UNKNOWN
-    ).all()  # wheels would leave the known ground
+    grid, terrain = worst[-1], mapping.service.terrain
+    assert grid.header.frame_id == "map"
+    assert (grid.info.height, grid.info.width) == terrain.elevation.shape
+    assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.05)
+    assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
     wait_until(lambda: ask_for_grid(client).data == worst[-1].data, "it from the service")
     client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
     for grids in (worst, best):

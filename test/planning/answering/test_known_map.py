@@ -74,5 +74,5 @@ def test_old_latencies_are_forgotten_and_a_lack_of_time_is_a_warning_for_a_while
     for number in range(LATENCIES):
         health.take_answer("", 6.0, f"{number}, check_path", 0.01)
     later = health.describe(60.0, "", "", {})
-    assert later.level == OK
+    assert (later.level, later.message) == (OK, "ready")
     assert later.values[f"largest latency of {LATENCIES} [ms]"] == "10.0"
