@@ -56,7 +56,7 @@ def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
     np.testing.assert_allclose(found, -1.5 + 0.05 * changes, atol=1e-9)
 
 
-def test_start_and_goal_on_the_map_are_placed_by_tf(start_server):
+def test_start_and_goal_on_the_map_are_placed_by_tf(start_server, client):
     server = start_server(map_frame="odom", transform_timeout=30.0)
     map_odom = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
     send_map_odom(server, map_odom)
@@ -66,6 +66,7 @@ def test_start_and_goal_on_the_map_are_placed_by_tf(start_server):
     )
     question = server.read_question(GetPlan.Request(start=start, goal=goal))
     np.testing.assert_allclose([question.start, question.goal], [START, GOAL], atol=1e-9)
+    assert client.plan(start, goal).header.frame_id == "odom"
 
 
 def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp(shared):
@@ -103,13 +104,13 @@ def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):
 def test_results_are_those_of_the_rover_of_the_question(shared):
     """Angles of a path of one rover had the wheel radius of the next one."""
     server = shared.server
-    known = server.service.snapshot()
-    question = PathQuestion(START, GOAL)
-    about = server.desk.register.identify("can_traverse", question, known)
     assert shared.client.set_parameter("rover", "m2020") == (True, "")
-    results = run_in_executor(server, lambda: server.publish(question.judge(known), about))
+    known, question = server.service.snapshot(), PathQuestion(START, GOAL)
+    about = server.desk.register.identify("can_traverse", question, known)
     assert shared.client.set_parameter("rover", "lsr1") == (True, "")
+    results = run_in_executor(server, lambda: server.publish(question.judge(known), about))
     assert results.rover is known.settings.rover
+    assert results.verdict().status[0].hardware_id == "m2020"
 
 
 def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, lasting):

@@ -41,7 +41,7 @@ def test_rows_go_along_y_columns_along_x_and_the_look_up_between_is_bilinear(
 
 
 def test_look_up_is_unknown_off_the_map_and_where_a_corner_is_unknown():
-    terrain = plane(-0.2, 0.3)
+    terrain = Terrain(plane(-0.2, 0.3).elevation[:40], 0.04, (-1.2, -1.2))
     xmin, xmax, ymin, ymax = terrain.bounds
     x = [xmin - 0.01, xmax + 0.01, 0.0, 0.0, np.nan]
     y = [0.0, 0.0, ymin - 0.01, ymax + 0.01, 0.0]

@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from rover_physics.errors import ModelError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.questions import Register
@@ -135,7 +136,9 @@ def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     assert np.isnan(service.terrain.elevation[80, 80])
 
 
-def test_an_impossible_tolerance_is_refused():
+def test_an_impossible_tolerance_and_a_payload_without_an_arm_are_refused():
+    with pytest.raises(ModelError, match="no manipulator"):
+        load_settings(rover="m2020", payload=3.0)
     for tolerance in (-0.1, math.nan, math.inf):
         with pytest.raises(PlanningError, match="tolerance is"):
             make_service().snapshot().answer((0, 0, 0), (1, 0, 0), tolerance)
