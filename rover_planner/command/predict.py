@@ -71,7 +71,15 @@ def predict(
     chance: Annotated[
         bool, flag("--chance", "Add the chance that the path fails, and that each waypoint does.")
     ] = False,
-    accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
+    accepted_chance: Annotated[
+        float | None,
+        option(
+            "P",
+            f"As --chance; largest one of a path that is traversable (default {ACCEPTED_CHANCE}).",
+            min=0,
+            max=1,
+        ),
+    ] = None,
     learned: Annotated[
         Path | None, option("FILE", "Friction and its uncertainty as learned, .json of learn.")
     ] = None,
@@ -97,6 +105,7 @@ def predict(
 
     gc.freeze()
     gc.enable()
+    chance |= accepted_chance is not None
     model = load_rover(rover)
     ground = load_terrain(terrain, max_cells)
     path = read_poses(poses)
@@ -138,7 +147,8 @@ def predict(
             judge = PartwiseJudge(model, ground, path, options, curvature=curvature, sigmas=sigmas)
             verdict = write_parts(out, len(path), judge, find_ranges, assumed)
         else:
-            asked = accepted_chance if chance else None
+            accepted = ACCEPTED_CHANCE if accepted_chance is None else accepted_chance
+            asked = accepted if chance else None
             if curvature is None:
                 prediction, verdict = judge_path(
                     model, ground, path, options, sigmas=sigmas, accepted_chance=asked

@@ -67,7 +67,8 @@ def read_drawn_classes(store: Any) -> NDArray:
 
 def bits_type(headings: int) -> np.dtype:
     """Return the smallest unsigned type with a bit for each heading."""
-    return np.min_scalar_type((1 << headings) - 1)
+    least = np.min_scalar_type((1 << headings) - 1)
+    return np.dtype(least.name)  # Zarr knows one of NumPy's two types of 8 bytes
 
 
 def list_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.number]:

@@ -169,6 +169,11 @@ def test_a_disk_that_is_full_is_one_line_and_leaves_no_temporary_file(files, mon
     assert [path.name for path in files.iterdir() if path.name.startswith(".")] == []
 
 
+def test_an_accepted_chance_asks_for_the_chance(files):
+    assert main([*predict_arguments(files), "--accepted-chance", "0.01"]) == 0
+    assert "failure_chance" in np.load(files / "out.npz")
+
+
 def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monkeypatch):
     bends = [0.0, 1.0, -1.0, np.inf, -np.inf]
     np.savez(files / "poses.npz", poses=poses_at(np.linspace(1.0, 3.0, 5), 2.0), curvature=bends)

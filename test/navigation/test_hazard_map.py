@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A hazard map has the class of each pose, and what a change cannot reach is not judged again."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES, classify_judged
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
+from rover_planner.planning.navigation import hazard_map
 from rover_planner.planning.navigation.hazard_map import HazardMap
 from support.grounds import raised
 from support.rovers import LSR1, M2020
@@ -175,3 +177,13 @@ def test_what_is_not_judged_yet_is_unknown_and_the_nearest_tiles_come_first():
     assert not hazards.work(0.0, near=(-2.0 + 4.0, 1.0 + 4.0))
     judged_cells = hazards.view().classes[0] != UNKNOWN
     assert judged_cells[70:90, 70:90].any() and not judged_cells[:60, :60].any()
+
+
+def test_a_slice_of_work_on_a_large_map_lists_no_cells_but_those_that_it_judges(monkeypatch):
+    monkeypatch.setattr(hazard_map, "classify_poses", lambda _, poses: np.zeros(len(poses), int))
+    hazards = HazardMap(1)
+    hazards.take(RoverOnMap(LSR1, Terrain(np.zeros((1000, 1000)), 0.1, (0.0, 0.0)), OPTIONS))
+    tracemalloc.start()
+    assert not hazards.work(0.0)
+    assert tracemalloc.get_traced_memory()[1] < 1000 * 1000
+    tracemalloc.stop()

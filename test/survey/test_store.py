@@ -66,6 +66,11 @@ def test_finished_chunks_are_not_done_again_and_half_written_or_lost_ones_are(fi
     assert prepare(finished, request).chunks == []
 
 
+def test_a_store_has_a_bit_for_each_of_the_most_headings(files):
+    store = prepare(files, make_request(headings=64)).store
+    assert store.layer("passable_headings").dtype == np.uint64
+
+
 def test_what_is_not_surveyed_yet_is_told_from_what_does_not_pass(files):
     store = prepare(files).store
     assert (store.layer("best_class")[:] == 255).all()

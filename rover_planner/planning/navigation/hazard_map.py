@@ -131,10 +131,9 @@ class HazardMap:
 
         They come tile by tile, the nearest first.
         """
-        row, column = np.nonzero(self._stale)
-        is_stale = np.zeros(np.array(self._stale.shape) // TILE + 1, bool)
-        is_stale[row // TILE, column // TILE] = True
-        tiles = np.argwhere(is_stale)
+        rows, columns = (np.arange(0, count, TILE) for count in self._stale.shape)
+        in_rows = np.logical_or.reduceat(self._stale, rows, axis=0)
+        tiles = np.argwhere(np.logical_or.reduceat(in_rows, columns, axis=1))
         if near is not None:
             place = (np.array(near) - terrain.origin) / (TILE * terrain.resolution) - 0.5
             tiles = tiles[np.argsort(np.hypot(*(tiles[:, ::-1] - place).T), kind="stable")]

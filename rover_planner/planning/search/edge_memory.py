@@ -49,21 +49,22 @@ class EdgeMemory:
 
         Returns what is known of poses of whole paths, and of pieces; what is added is kept.
         """
-        before, self._site = self._site, site
+        before, self._site = self._site, None  # if forgetting fails, nothing holds
         if self._poses is None or before is None or not _is_alike(before, site):
             of_pieces, is_same = KnownPoses(), site.options.asked_chance is None
             self._poses = KnownPoses(others=of_pieces if is_same else None), of_pieces
             self._edges = None
             self._forget_costs(lambda places: np.ones(len(places), bool))
-            return self._poses
-        reach = find_reach(site.rover) + MARGIN * site.terrain.resolution
-        changed = _count_changes(before, site)
-        are_near = partial(changed.are_near, reach=reach)
-        for one in self._poses:
-            one.forget(are_near)
-        if self._edges is not None:
-            self._edges.forget(_find_touching(self._edges, changed, reach))
-        self._forget_costs(are_near)
+        else:
+            reach = find_reach(site.rover) + MARGIN * site.terrain.resolution
+            changed = _count_changes(before, site)
+            are_near = partial(changed.are_near, reach=reach)
+            for one in self._poses:
+                one.forget(are_near)
+            if self._edges is not None:
+                self._edges.forget(_find_touching(self._edges, changed, reach))
+            self._forget_costs(are_near)
+        self._site = site
         return self._poses
 
     def _forget_costs(self, are_near: Callable[[Floats], NDArray[np.bool_]]) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from rover_physics import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search import edge_memory
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.site import Site
@@ -37,3 +38,15 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
         assert_same(part.prediction, whole.prediction)
         assert_same(part.prediction.between, whole.prediction.between)
         ground = change_at_random(ground, rng)
+
+
+def test_where_forgetting_fails_the_next_search_knows_nothing_of_the_old_map(monkeypatch):
+    ground, memory = make_terrain(waves), EdgeMemory()
+    PathJudge(Site(LSR1, ground, OPTIONS), *memory.begin(Site(LSR1, ground, OPTIONS))).check(WAY)
+    site = Site(LSR1, raised(ground, np.s_[:, :], 0.3 * np.eye(*ground.elevation.shape)), OPTIONS)
+    with monkeypatch.context() as patch:
+        patch.setattr(edge_memory, "find_changes", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            memory.begin(site)
+    judge = PathJudge(site, *memory.begin(site))
+    assert repr(judge.check(WAY).verdict) == repr(PathJudge(site).check(WAY).verdict)
