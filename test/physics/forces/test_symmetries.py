@@ -9,15 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import Rover, SweepOptions, Terrain, judge_paths, judge_poses
-from support.grounds import (
-    bouldered,
-    enlarged,
-    random_poses,
-    rocky,
-    scaled_for,
-    smooth,
-    with_std,
-)
+from support.grounds import bouldered, enlarged, random_poses, rocky, scaled_for, smooth, with_std
 from support.paths import arc_of, poses_at
 from support.rover_geometry import ANGLE, GAP, turned_round
 from support.rovers import LSR1, M2020, SIMILAR, similar
