@@ -71,12 +71,6 @@ def test_a_store_has_a_bit_for_each_of_the_most_headings(files):
     assert store.layer("passable_headings").dtype == np.uint64
 
 
-def test_what_is_not_surveyed_yet_is_told_from_what_does_not_pass(files):
-    store = prepare(files).store
-    assert (store.layer("best_class")[:] == 255).all()
-    assert np.isnan(store.layer("worst_tilt")[:]).all()
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -126,8 +120,10 @@ def test_a_folder_that_is_no_survey_is_refused_and_left_alone(files):
         SurveyStore(files / "nothing")
 
 
-def test_two_commands_do_not_write_into_one_store(files):
+def test_a_new_store_is_told_from_one_where_nothing_passes_and_has_one_writer(files):
     store = prepare(files).store
+    assert (store.layer("best_class")[:] == 255).all()
+    assert np.isnan(store.layer("worst_tilt")[:]).all()
     refused = pytest.raises(PlanningError, match="another survey is writing into")
     with store.locked(), refused, SurveyStore(store.path).locked():
         raise AssertionError("two at once")

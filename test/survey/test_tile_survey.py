@@ -112,10 +112,11 @@ def test_the_layers_sum_up_the_headings_of_each_cell_and_turns_to_both_sides(gro
     np.testing.assert_array_equal(layers["best_class"] == 0, bits.any(axis=1))
     np.testing.assert_array_equal(layers["first_limit"] == NO_LIMIT, bits.all(axis=1))
     told = layers["worst_tilt"], -layers["worst_belly_clearance"]
-    values = [one.reshape(-1, 4) for one in (prediction.tilt, -prediction.belly_clearance)]
+    tilt = np.arccos(np.cos(prediction.roll) * np.cos(prediction.pitch))
+    values = [one.reshape(-1, 4) for one in (tilt, -prediction.belly_clearance)]
     some = ~np.isnan(values[0]).all(axis=1)
     for worst, each in zip(told, values, strict=True):
-        np.testing.assert_allclose(worst[some], np.nanmax(each[some], axis=1), rtol=1e-6)
+        np.testing.assert_allclose(worst[some], np.nanmax(each[some], axis=1), 1e-6, 1e-7)
     assert np.isnan(layers["worst_tilt"][~some]).all() and (~some).any()
     worst, best = (layers[f"{one}_friction_utilisation"][some] for one in ("worst", "best"))
     assert (worst >= best).all()

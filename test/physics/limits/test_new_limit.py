@@ -64,7 +64,7 @@ def test_the_number_survives_the_file_and_without_it_the_limit_is_not_asked(stri
         rover_with("many")  # type: ignore[arg-type]
 
 
-def test_the_verdict_obeys_it_and_names_the_wheel(strict):
+def test_the_verdict_obeys_it_and_names_the_wheel_and_the_page_has_a_lane_for_it(strict):
     prediction, verdict = judge_path(strict, GROUND, PATH)
     limit = strict.limits.further["wheel_load"]
     beyond = prediction.wheel_loads.max(axis=1) > limit
@@ -73,6 +73,13 @@ def test_the_verdict_obeys_it_and_names_the_wheel(strict):
     assert "wheel carries too much: " in verdict.reason and f"limit {limit:.2f}" in verdict.reason
     first = judge_path(strict, GROUND, PATH, stop_at_failure=True)[1]
     assert (first.first_failure, first.reason) == (verdict.first_failure, verdict.reason)
+    limits = find_path_limits(strict, prediction, verdict)
+    lane = limits.lane("wheel_load")
+    assert lane.title == "heaviest"
+    assert lane.bounds[0] == limit
+    assert (lane.used > 1.0).tolist() == [False] * verdict.first_failure + [True]
+    heaviest = WHEELS[prediction.wheel_loads[verdict.first_failure].argmax()]
+    assert limits.find_link(lane, -1) == heaviest
 
 
 def test_edges_of_the_search_and_scores_obey_it(strict):
@@ -92,14 +99,3 @@ def test_hazard_map_and_survey_obey_it(strict):
     layers = survey_tile(request, GROUND, PATH[:, :2])
     expected = np.where(refused, number_limits()["wheel_load"], NO_LIMIT)
     assert (layers["first_limit"] == expected).all()
-
-
-def test_the_page_has_a_lane_for_it(strict):
-    prediction, verdict = judge_path(strict, GROUND, PATH)
-    limits = find_path_limits(strict, prediction, verdict)
-    lane = limits.lane("wheel_load")
-    assert lane.title == "heaviest"
-    assert lane.bounds[0] == strict.limits.further["wheel_load"]
-    assert (lane.used > 1.0).tolist() == [False] * verdict.first_failure + [True]
-    heaviest = WHEELS[prediction.wheel_loads[verdict.first_failure].argmax()]
-    assert limits.find_link(lane, -1) == heaviest

@@ -46,18 +46,7 @@ def service():
     return make_service(plane(0.0, 0.0, half=4.0), planner=AUTO, search_budget=60.0)
 
 
-def test_an_answer_leads_around_a_marked_place_until_it_is_cleared(service):
-    service.mark(PLACE)
-    judged = service.snapshot().answer(START, GOAL)
-    assert judged.traversable, judged.reason
-    away = np.hypot(judged.candidate.poses[:, 0] - PLACE.x, judged.candidate.poses[:, 1])
-    assert away.min() >= PLACE.radius
-    assert judged.candidate.verdict.failure_chance == 0.0  # it is asked of this path, too
-    service.marked = NONE_MARKED
-    assert np.abs(service.snapshot().answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
-
-
-def test_a_path_into_a_marked_place_is_refused_with_reason_and_date(service):
+def test_until_it_is_cleared_a_marked_place_refuses_paths_and_answers_lead_around_it(service):
     service.mark(PLACE)
     service.given_path = GivenPath(poses_at(np.linspace(0.0, 3.0, 40)), "")
     judged = service.snapshot().check_path()
@@ -65,6 +54,13 @@ def test_a_path_into_a_marked_place_is_refused_with_reason_and_date(service):
     assert PLACE.reason in judged.reason and PLACE.date in judged.reason
     rim = judged.candidate.poses[judged.candidate.verdict.first_failure]
     assert rim[0] == pytest.approx(PLACE.x - PLACE.radius, abs=0.1)
+    judged = service.snapshot().answer(START, GOAL)
+    assert judged.traversable, judged.reason
+    away = np.hypot(judged.candidate.poses[:, 0] - PLACE.x, judged.candidate.poses[:, 1])
+    assert away.min() >= PLACE.radius
+    assert judged.candidate.verdict.failure_chance == 0.0  # it is asked of this path, too
+    service.marked = NONE_MARKED
+    assert np.abs(service.snapshot().answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
 
 
 def test_a_goal_in_a_marked_place_is_answered_with_one_near_it(service):
