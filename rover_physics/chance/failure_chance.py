@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The chance that a path fails: the share of a fixed set of samples in which it breaks a limit.
 
-Poses that use less than FAR of every limit keep them in all samples. So do those that use less
-than NEAR with the least friction and torque of all samples, and all else off to either side. Where
-wheels stand on rocks, a place a little aside has other contacts, and only ROCKY_FAR is safe. The
-others are evaluated anew in each sample, with the contacts that they have at its place: samples
-that share a place settle once. Drops and poses between waypoints are those of the prediction. On
-even ground a share of the model's error counts.
+Poses that use less than FAR of every limit keep them in all samples, on uneven ground, where a
+place a little aside has other contacts, those that use less than UNEVEN_FAR. So do those of which
+none around uses more than NEAR with the least friction and torque of all samples, and all else off
+to either side. The others are evaluated anew in each sample, with the contacts that they have at
+its place: samples that share a place settle once. Drops and poses between waypoints are those of
+the prediction. On even ground a share of the model's error counts.
 """
 
 from dataclasses import dataclass, replace
@@ -41,8 +41,9 @@ SAMPLES, PLACES = 32, 8
 FAR = 0.5
 """Use of a limit below which no sample breaks it: it would have to double. Less where friction or
 torque of a sample may be less than half."""
-ROCKY, ROCKY_FAR = 0.3, 0.25
-"""Difference of contact angles [rad] above which the ground is rocky, and what FAR is there."""
+UNEVEN_FAR, AROUND = 0.25, 5.0
+"""What FAR is where ground is uneven, and the distance along the path over which poses are around
+each other [standard deviations of the position]."""
 NEAR = 0.95
 """Use with the least friction and torque of all samples below which no sample breaks a limit."""
 EVEN, EVEN_SHARE = 0.1, 0.3
@@ -103,8 +104,9 @@ def find_failure_chance(
     groups = draw_samples(model.rover.uncertainty, SAMPLES, PLACES)
     if model.options.policy == OPTIMAL:
         groups = tuple(one.weaken() for one in groups)
+    around = AROUND * model.rover.uncertainty.position if on_path else 0.0
     on_path &= model.wheels.on_servos
-    asked, on_path = _find_asked(model, swept, rows, groups, on_path)
+    asked, on_path = _find_asked(model, swept, rows, groups, on_path, around)
     settled = rows.results["status"] == PoseStatus.SETTLED
     failed = np.zeros((SAMPLES if len(asked) else 1, n), bool)
     failed[:, rows.waypoint[~settled]] = True
@@ -141,22 +143,23 @@ def _find_asked(
     rows: Crossings,
     groups: tuple[PlacedSamples, ...],
     on_path: bool,
+    around: float,
 ) -> tuple[NDArray[np.int64], bool]:
     """Return the indices of the rows that a sample may break, and whether the path decides there.
 
-    Where heights are uncertain, all that use more than FAR are asked.
+    What is found of a row counts for those within a distance [m] along the path, `around`. Where
+    heights are uncertain, all that use more than FAR are asked.
     """
     worst_two, n = worst_of(groups), len(swept.prediction.poses)
     weakest = worst_two[0].samples[0]
     far = min(FAR, NEAR * min(weakest.friction[0], weakest.torque))
-    rocky = _unevenness(rows.results) > ROCKY
-    rocky[n:] = False  # poses between waypoints stay where they are
+    is_even = _unevenness(rows.results) < EVEN
     near = _find_near(model, swept, rows.results, on_path, far)
-    near |= rocky & _find_near(model, swept, rows.results, on_path, min(far, ROCKY_FAR))
+    near |= ~is_even & _find_near(model, swept, rows.results, on_path, min(far, UNEVEN_FAR))
     near &= rows.results["status"] == PoseStatus.SETTLED
     if not near.any() or model.terrain.elevation_std is not None:
         return np.flatnonzero(near), on_path
-    closer = rocky | _find_near(model, swept, rows.results, on_path, NEAR)
+    closer = _find_near(model, swept, rows.results, on_path, NEAR)
     by_path, asked = _needs_path(model, rows.results), np.flatnonzero(near)
     for group in worst_two:
         found = _evaluate(model, rows, asked, n, group)[0]
@@ -165,7 +168,18 @@ def _find_asked(
             _write_path(model, swept, worst)
         closer |= _find_near(model, swept, worst, on_path, NEAR)
         by_path |= _needs_path(model, worst)
+    closer[:n] |= _widen(closer[:n], swept.prediction.distance, around)
     return np.flatnonzero(near & closer), on_path and by_path
+
+
+def _widen(marked: NDArray[np.bool_], distance: Floats, around: float) -> NDArray[np.bool_]:
+    """Return the waypoints (n,) within a distance [m] along the path of marked ones (n,)."""
+    at = distance[marked]
+    if not len(at):
+        return marked
+    following = np.searchsorted(at, distance).clip(max=len(at) - 1)
+    apart = np.minimum(abs(at[following] - distance), abs(at[following - 1] - distance))
+    return np.asarray(apart < around)
 
 
 def _cut_around(model: PackedModel, poses: Floats) -> Terrain:
