@@ -36,7 +36,7 @@ from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.questions import PathQuestion, UnreadableRequest
+from rover_planner.planning.answering.questions import PathQuestion
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import (
     ServiceSettings,
@@ -241,7 +241,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         except RoverError as error:
             return GivenPath(None, str(error), *describe_path(path), code="bad_request")
 
-    def read_question(self, request: GetPlan.Request) -> PathQuestion | UnreadableRequest:
+    def read_question(self, request: GetPlan.Request) -> PathQuestion:
         """Return the question for a path between poses of the robot, by the transforms of now.
 
         An empty start is where the rover is.
@@ -252,7 +252,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             start = self._find_here() if is_empty(begin) else read(begin, "start")
             return PathQuestion(start, read(end, "goal"), tolerance, about)
         except RoverError as error:
-            return UnreadableRequest(str(error), about)
+            return PathQuestion(hash=about, refusal=str(error))
 
     def _fill_plan(
         self, _request: object, response: GetPlan.Response, answer: Answer[PathJudgement]

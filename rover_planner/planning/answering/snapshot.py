@@ -172,7 +172,7 @@ class Snapshot:
             return missing
         assert self.path.poses is not None
         site = self._site()
-        poses = densify(self.path.poses, site.options.waypoint_spacing)
+        poses, _ = densify(self.path.poses, site.options.waypoint_spacing)
         path = PathJudge(site).check(poses, stop_at_failure=stop_at_failure)
         return self._describe(site, path)
 
