@@ -17,11 +17,10 @@ from rclpy.node import Node
 from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.nodes.result_topics import ResultMessages
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
-from rover_planner.planning.answering.judgement import PathJudgement
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement
 from rover_planner.planning.answering.questions import Question
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import densify
-from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.optional_types import find_type
 
 NO_PATH = "NO_VALID_PATH"

@@ -35,7 +35,7 @@ from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
-from rover_planner.planning.answering.judgement import PathJudgement
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement
 from rover_planner.planning.answering.questions import PathQuestion
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import (
@@ -46,7 +46,6 @@ from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.path_query import Pose
-from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer

@@ -10,9 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.traversability.reach import ReachAnswer, judge_reach
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.parameters.traverse_server import USE
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import (
+    LEARNED,
+    TOLD,
+    IdentityReport,
+    PathJudgement,
+    refusal,
+)
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
-from rover_planner.planning.verdict_report import LEARNED, TOLD, IdentityReport
 
 
 @dataclass(frozen=True, eq=False)
