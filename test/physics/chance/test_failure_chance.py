@@ -214,8 +214,9 @@ def test_unknown_ground_beside_the_path_is_no_failure():
     beyond = abs(y) > 0.36 + ground.resolution  # the wheels end at 0.35 m
     seen = replace(ground, elevation=np.where(beyond[:, None], np.nan, ground.elevation))
     told = chance_on(ground, rover).failure_chance
-    assert 0.1 < told < 0.9 and chance_on(seen, rover).failure_chance == told
-    aside = judge_path(rover, seen, straight(5) + [0.0, 0.05, 0.0], SLIPPERY)[1]
+    assert 0.1 < told < 0.9
+    assert chance_on(seen, rover).failure_chance == told
+    aside = judge_path(rover, seen, straight(5) + np.array([0.0, 0.05, 0.0]), SLIPPERY)[1]
     assert aside.code == "unknown_ground"
 
 
