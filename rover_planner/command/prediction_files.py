@@ -177,19 +177,23 @@ def predict_to_file(out: Path, asked: AskedPoses, report: Callable[[str], object
     """
     rover, terrain, options, sigmas = asked.rover, asked.terrain, asked.options, asked.sigmas
     path, bends, count = asked.poses, asked.curvature, len(asked.poses)
+    accepted = asked.accepted_chance
     assumed, ranges, classes = assume(rover, options, sigmas), None, None
     if asked.torque_ranges:
         report("find the ranges of the torques")
         ranges = find_torque_ranges(rover, terrain, path, options, bends)
     report(f"sweep {count} poses of {rover.name} (the first run compiles the model)")
-    if count > MAX_IN_MEMORY and asked.accepted_chance is None and not asked.classes:
+    if count > MAX_IN_MEMORY and accepted is None and not asked.classes:
         judge = PartwiseJudge(rover, terrain, path, options, curvature=bends, sigmas=sigmas)
         return _write_parts(out, count, judge, assumed, ranges)
-    limits = {"sigmas": sigmas, "accepted_chance": asked.accepted_chance}
     if bends is None:
-        prediction, verdict = judge_path(rover, terrain, path, options, **limits)
+        prediction, verdict = judge_path(
+            rover, terrain, path, options, sigmas=sigmas, accepted_chance=accepted
+        )
     else:
-        prediction, verdict = judge_poses(rover, terrain, path, bends, options, **limits)
+        prediction, verdict = judge_poses(
+            rover, terrain, path, bends, options, sigmas=sigmas, accepted_chance=accepted
+        )
     if asked.classes:
         report("classify the waypoints")
         classes = classify_judged(
