@@ -69,8 +69,7 @@ class ObservedGround:
         total, assumed = int(counts.sum()), int(counts[ASSUMED])
         unobserved = (assumed + int(counts[UNSEEN])) / total
         first, beyond = (
-            int(np.argmax(worst > best)) if worst.max() > best else -1
-            for best in (SEEN, ASSUMED)
+            int(np.argmax(worst > best)) if worst.max() > best else -1 for best in (SEEN, ASSUMED)
         )
         return UnobservedShare(unobserved, assumed / total, first, beyond)
 
