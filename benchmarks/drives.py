@@ -16,8 +16,7 @@ from rover_physics import Rover, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.simulator.mujoco_rover import MAX_TILT, TIMESTEP, MujocoRover
-from rover_planner.simulator.path_follower import PathFollower
-from rover_planner.simulator.second_try import SecondTry
+from rover_planner.simulator.path_follower import PathFollower, SecondTry
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
