@@ -10,8 +10,6 @@ import numpy as np
 from rover_physics.limits.table import CHANCE, Sense
 from rover_physics.names import SERVO, WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.sweep import check_poses, predict_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import RoverLimits, find_uses, limits_of
@@ -85,11 +83,6 @@ class Case:
         )
         path = self.site.refuse_ground(Candidate(self.poses, *judged))
         return JudgedCase(self, path.prediction, path.verdict)
-
-    def predict(self) -> PathPrediction:
-        """Predict all of the path, also beyond its first failure."""
-        model = pack_model(self.rover, self.terrain, self.options)
-        return predict_paths(model, [check_poses(self.poses)], stop_at_failure=False)[0].prediction
 
     def fails_at(self, place: int, rows: slice, by_chance: bool) -> bool:
         """Return whether a piece of the path shows that a waypoint in it, or one before it, fails.
@@ -190,30 +183,29 @@ class JudgedCase:
     @property
     def time(self) -> float:
         """Time of the path [s], as if the rover could drive on where it fails."""
-        total = self._sum_up("time")
-        length = float(self.distance[-1])
-        return length / self.case.rover.nominal_speed if total is None else total
+        return self._sum_up("time", float(self.distance[-1]) / self.case.rover.nominal_speed)
 
     @property
     def energy(self) -> float:
         """Energy of the path [J] in the same way; 0 if none of it is known."""
-        return self._sum_up("energy") or 0.0
+        return self._sum_up("energy", 0.0)
 
-    def _sum_up(self, name: str) -> float | None:
-        """Return the sum at the end of the path: where it is not known, as before by distance."""
+    def _sum_up(self, name: str, usual: float) -> float:
+        """Return the sum at the end of the path; if unknown, as before by distance, or `usual`."""
         values, distance = getattr(self._whole, name), self.distance
         if np.isfinite(values[-1]):
             return float(values[-1])
         known = np.flatnonzero(np.isfinite(values) & (distance > 0.0))
         if not known.size:
-            return None
+            return usual
         return float(values[known[-1]] * distance[-1] / distance[known[-1]])
 
     @cached_property
     def _whole(self) -> PathPrediction:
         """The prediction of all of the path, on ground that holds if the wheels slip on this."""
         slips = self.verdict.code == "friction"
-        return (self.case.change(friction=MOST_FRICTION) if slips else self.case).predict()
+        case = self.case.change(friction=MOST_FRICTION) if slips else self.case
+        return judge_path(case.rover, case.terrain, case.poses, case.options, sigmas=0)[0]
 
     @property
     def place_on_ground(self) -> tuple[float, float]:
