@@ -15,7 +15,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 from msg_adapters.elevation import is_same_cloud
-from msg_adapters.raw_messages import DamagedMessageError, SensorReader
+from msg_adapters.raw_messages import DamagedMessageError, read_raw
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_planner.planning.navigation.transforms import Rigid, TransformError
@@ -167,7 +167,7 @@ def read_message(message: bytes, kind: type) -> Any:
         MessageError: The bytes are no such message.
     """
     if kind is PointCloud2:
-        return SensorReader().read(message, kind)
+        return read_raw(message, kind)
     try:
         return deserialize_message(message, kind)
     except Exception as error:  # RMWError, of a module that differs between distributions
