@@ -7,12 +7,12 @@ table come from the service. The candidate paths in the picture are recomputed i
 """
 
 import dataclasses
-import importlib.util
 import json
 import os
 import random
+import signal
 import socket
-import time
+import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +32,7 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.demo.goals import Mission, Pose, choose_mission
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.known_map import describe_terrain
+from rover_planner.shell.extras import need
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
@@ -99,11 +100,12 @@ def run_demo(
         The server's verdict on each goal.
 
     Raises:
-        PlanningError, RoverError: Bad input.
-        DemoError: ROS 2 is missing, or a process failed.
+        PlanningError, RoverError: Bad input, or ROS 2 or matplotlib is missing.
+        DemoError: A process failed.
     """
     steps = Steps()
-    _check_environment()
+    need("rclpy", "the demo")
+    need("matplotlib", "the picture of the demo")
     _prepare_folder(picture)
     rover = load_rover(rover_name)
     map_name, terrain = _prepare_map(steps, map_name, picture.parent, seed)
@@ -127,19 +129,6 @@ def run_demo(
         soft_wrap=True,
     )
     return answers
-
-
-def _check_environment() -> None:
-    """Raise DemoError if ROS 2 or matplotlib is missing."""
-    for module, what in (
-        ("rclpy", "ROS 2 Jazzy"),
-        ("nav_msgs", "nav_msgs"),
-        ("matplotlib", "matplotlib"),
-    ):
-        if importlib.util.find_spec(module) is None:
-            raise DemoError(
-                f"the demo needs {what}, which is not there: source ROS 2, or pip install .[all]"
-            )
 
 
 def _prepare_folder(picture: Path) -> None:
@@ -219,8 +208,6 @@ def _compile(stage: Stage) -> None:
     """Compile the kernels in a child process, which can be stopped at any time."""
     with stage.steps.step("compile the model's kernels (the first time takes a while)"):
         child = stage.start(COMPILER)
-        for _ in child.lines(lambda: None):
-            pass
         _expect_success(child)
 
 
@@ -258,15 +245,16 @@ def _join(pose) -> str:
 def _events(planner: ChildProcess, server: ChildProcess) -> Iterator[dict[str, Any]]:
     """Yield the mission planner's events; raise DemoError if the server ends."""
 
-    def watch() -> None:
-        if not server.running:
-            raise DemoError(
-                f"{server.name} ended with code {server.exit_code}: {server.last_line()} "
-                f"(see {server.log})"
-            )
+    def end_together() -> None:
+        server.wait()
+        if planner.running:
+            planner.send_signal(signal.SIGTERM)
 
-    for line in planner.lines(watch):
+    threading.Thread(target=end_together, daemon=True).start()
+    for line in planner.lines():
         yield json.loads(line)
+    if not server.running:
+        raise _failure_of(server)
 
 
 def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess) -> None:
@@ -278,13 +266,15 @@ def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess)
 
 def _expect_success(child: ChildProcess) -> None:
     """Wait until a child has ended; raise DemoError if it failed."""
-    while child.running:
-        time.sleep(0.02)
-    if child.exit_code != EXIT_OK:
-        raise DemoError(
-            f"{child.name} ended with code {child.exit_code}: {child.last_line()} "
-            f"(see {child.log})"
-        )
+    if child.wait() != EXIT_OK:
+        raise _failure_of(child)
+
+
+def _failure_of(child: ChildProcess) -> DemoError:
+    """Return the error that tells how a child has ended."""
+    return DemoError(
+        f"{child.name} ended with code {child.exit_code}: {child.last_line()} (see {child.log})"
+    )
 
 
 def _draw(

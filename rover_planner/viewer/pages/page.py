@@ -23,7 +23,7 @@ from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import Step
-from rover_planner.viewer.state.layers import PREDICTED, Colouring, LayerRequest
+from rover_planner.viewer.state.layers import PREDICTED, Colouring
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -75,9 +75,9 @@ class Page(PageBase):
 
     def paint(self) -> None:
         """Begin to colour the ground with what is shown on it."""
-        path, now = self.session.shown.path.poses, self.session.shown.scenario
-        asked = LayerRequest(now.rover, now.terrain, self.colouring, now.options.model, path)
-        self.painter.ask(paint(asked, self.survey))
+        shown = self.session.shown
+        site, path = shown.scenario.site, shown.path.poses
+        self.painter.ask(paint(site, self.colouring, path, self.survey))
 
     # What visitors ask.
 
