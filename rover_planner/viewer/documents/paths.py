@@ -92,10 +92,11 @@ def _list_policies(shown: Shown) -> list[dict[str, Any]]:
     """Return the verdicts under all policies; none for a replay, whose soil is not known."""
     rows = []
     for policy, title in POLICY_TITLES.items() if shown.scenario.recorded is None else ():
-        one = shown.by_policy.get(policy, "")
+        values, one = shown.by_policy.get(policy, (None, ""))
+        if policy == shown.verdict.policy:
+            values, one = shown.scenario, shown.verdict
         passes, reason = (None, one) if isinstance(one, str) else (one.traversable, one.reason)
-        is_fresh = policy == shown.verdict.policy or shown.policies_for is shown.scenario
-        old = not (one and is_fresh)
+        old = values is not shown.scenario
         word = {None: "not judged", True: "passes", False: "refused"}[passes]
         row = {"title": title, "word": word, "passes": passes, "old": old}
         rows.append({**row, "reason": reason or word})
