@@ -15,7 +15,7 @@ import socket
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.markup import escape
@@ -32,13 +32,15 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.demo.goals import Mission, Pose, choose_mission
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.known_map import describe_terrain
+from rover_planner.planning.path_query import PathAnswer, add_path
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import find_path
+from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.search.site import Site
 from rover_planner.shell.extras import need
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-
-if TYPE_CHECKING:
-    from rover_planner.planning.path_query import PathAnswer
 
 COMPILER = "rover_physics.warm_up"
 """Module that compiles the kernels when it is run."""
@@ -149,17 +151,14 @@ def _prepare_map(
     steps: Steps, map_name: str | None, folder: Path, seed: int
 ) -> tuple[str, Terrain]:
     """Load the map, or generate and save one; return its name and terrain."""
-    if map_name is not None:
-        with steps.step(f"load the map {escape(map_name)}") as status:
-            terrain = load_terrain(map_name)
-            status.update(f"{status.status}: {describe_terrain(terrain)}")
-        return map_name, terrain
-    with steps.step(f"make a Mars-like terrain, seed {seed}") as status:
-        path = folder / "terrain.npz"
-        save_terrain(path, make_mars_terrain(seed))
-        terrain = load_terrain(path)
+    name = str(folder / "terrain.npz") if map_name is None else map_name
+    made, loaded = f"make a Mars-like terrain, seed {seed}", f"load the map {escape(name)}"
+    with steps.step(made if map_name is None else loaded) as status:
+        if map_name is None:
+            save_terrain(name, make_mars_terrain(seed))
+        terrain = load_terrain(name)
         status.update(f"{status.status}: {describe_terrain(terrain)}")
-    return str(path), terrain
+    return name, terrain
 
 
 def _as_the_server_knows_it(terrain: Terrain, max_gap: float) -> Terrain:
@@ -300,14 +299,8 @@ def _draw(
     )
 
 
-def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> "PathAnswer":
+def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> PathAnswer:
     """Return the best candidate path, or if all are refused the one that a search finds."""
-    from rover_planner.planning.path_query import add_path
-    from rover_planner.planning.search.judge import PathJudge
-    from rover_planner.planning.search.path_search import find_path
-    from rover_planner.planning.search.query import SearchQuery
-    from rover_planner.planning.search.site import Site
-
     site = Site(rover, ground)
     answer = PathJudge(site).search(start, goal)
     if answer.traversable or not ground.contains(*goal[:2]):
