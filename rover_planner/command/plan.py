@@ -9,14 +9,14 @@ import typer
 
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command import shared
-from rover_planner.command.shared import argument, flag, option
+from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 Out = Annotated[Path, argument("OUT", "The path with its predictions, .npz; written if found.")]
-Picture = Annotated[Path | None, option("FILE", "Draw the answer on the map (.png, .svg).")]
+Picture = Annotated[Path | None, picture_option("Draw the answer on the map (.png, .svg).")]
 
 
 def plan(
