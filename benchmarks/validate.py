@@ -17,6 +17,7 @@ import numpy as np
 import typer
 from scipy.optimize import linprog
 
+from benchmarks.grounds import Obstacle
 from benchmarks.measure import console, print_table
 from rover_physics import (
     PathPrediction,
@@ -46,18 +47,10 @@ LENGTH, TURN = 2.4, np.pi
 """Length of an arc [m] and angle of a turn on the spot [rad]."""
 
 
-@dataclass(frozen=True)
-class ReferenceDrive:
+@dataclass(frozen=True, kw_only=True)
+class ReferenceDrive(Obstacle):
     """One drive of the rover lsr1 over an obstacle, from x = -1.2 to 1.2 along +x."""
 
-    kind: str
-    """step, ditch, bump_one_side, slope or cross_slope."""
-    size: float
-    """Height or width [m], or angle of a slope [deg]."""
-    friction: float
-    """Friction coefficient."""
-    max_torque: float
-    """Torque limit of the speed servos [N m]."""
     outcome: str
     """passed, stuck or tipped; tipped includes sliding off."""
     end: float
@@ -80,11 +73,14 @@ def judge_drives(policy: str) -> Iterator[tuple[ReferenceDrive, Verdict]]:
     rover = unlimited(load_rover("lsr1"))
     for row in json.loads((DATA / "drives.json").read_text())["rows"]:
         drive = ReferenceDrive(
-            row["kind"], row["size"], row["mu"], row["tau_max"], row["outcome"], row["x"]
+            kind=row["kind"],
+            size=row["size"],
+            friction=row["mu"],
+            max_torque=row["tau_max"],
+            outcome=row["outcome"],
+            end=row["x"],
         )
-        options = SweepOptions(friction=drive.friction, max_torque=drive.max_torque, policy=policy)
-        ground = drive_ground(drive.kind, drive.size)
-        prediction = judge_path(rover, ground, drive_path(), options)[0]
+        prediction = judge_path(rover, drive.ground, drive_path(), drive.options(policy))[0]
         yield drive, hold_against_limits(rover, prediction)
 
 
@@ -298,15 +294,14 @@ def print_energy() -> None:
 
     MuJoCo's time step is 2 ms: with the usual 4 ms its wheels chatter on their contacts.
     """
-    from benchmarks.drives import DROOP, OBSTACLES, drive, run_in_processes
+    from benchmarks.drives import DROOP, OBSTACLES, drive, rover_of, run_in_processes
 
     errors, rows = [], []
     jobs = [(obstacle, DROOP, 1, 2.0, 0.002) for obstacle in OBSTACLES]
     for obstacle, row in zip(OBSTACLES, run_in_processes(drive, jobs), strict=True):
         if row.passed:
-            options = SweepOptions(policy="servo", friction=obstacle.friction)
-            rover, ground = unlimited(obstacle.rover), obstacle.ground
-            ours = float(judge_path(rover, ground, drive_path(), options)[0].energy[-1])
+            asked = unlimited(rover_of(obstacle)), obstacle.ground, drive_path()
+            ours = float(judge_path(*asked, obstacle.options("servo"))[0].energy[-1])
             errors.append(abs(ours / row.energy - 1.0))
             rows.append((obstacle.label, row.energy, ours))
     rows.append(("median error", None, f"{np.median(errors):.0%}"))

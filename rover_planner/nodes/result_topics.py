@@ -22,8 +22,7 @@ from msg_adapters.stamps import ns_to_stamp
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement, VerdictReport
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.server_inputs import ServerInputs, describe_path

@@ -3,13 +3,13 @@
 
 import contextlib
 import logging
-import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from typing import Any
 
 from rover_planner.errors import PlanningError
+from rover_planner.shell.run_program import ctrl_c_later
 from rover_planner.survey.chunk_survey import SurveyJob, estimate_memory
 from rover_planner.survey.store import StoreNotes
 
@@ -108,7 +108,8 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
                 ) from None
             yield stack.enter_context(client)
             return
-        with _ctrl_c_later():
+        resource_tracker.ensure_running()  # it unblocks the signal in the thread that starts it
+        with ctrl_c_later():  # a terminal sends it to workers, too, which would print traces
             cluster = LocalCluster(
                 n_workers=settings.workers,
                 threads_per_worker=1,
@@ -119,21 +120,6 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
             )
             stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
-
-
-@contextlib.contextmanager
-def _ctrl_c_later() -> Iterator[None]:
-    """Let Ctrl-C wait until the end of the block.
-
-    Threads and processes that start in it, and all that these start, never see it: a terminal
-    sends it to workers, too, which would print traces.
-    """
-    resource_tracker.ensure_running()  # it unblocks the signal in the thread that starts it
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager

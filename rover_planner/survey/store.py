@@ -19,10 +19,9 @@ from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
-from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import NOT_SURVEYED, list_layers, number_limits
 from rover_planner.survey.layout import Index, SurveyLayout
-from rover_planner.survey.map_source import MAP, MapFrame, StoredMap, keep_map
+from rover_planner.survey.map_source import MAP, GeoTiffMap, MapFrame, StoredMap, keep_map
 
 FORMAT = 2
 """Version of the store's format: 2 writes all files of a chunk, also those without values."""
