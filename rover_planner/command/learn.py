@@ -88,7 +88,7 @@ def learn(
         learned_map = replace(map_, friction=np.where(np.isfinite(mean), mean, known))
         save_terrain(ground, learned_map, friction_std=std)
     if picture is not None:
-        from rover_planner.figures.learning_picture import draw_learning
+        from rover_planner.figures.path_pictures import draw_learning
 
         draw_learning(picture, map_, np.array(places), estimates, mean)
     found = learner.estimate.friction
