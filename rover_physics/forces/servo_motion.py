@@ -48,7 +48,7 @@ SERVO_STATE = record_type(
     ("mu", float, (6,)),  # friction coefficients within the friction share
     ("yields", np.int64, (6,)),  # 1 where a wheel is on yielding soil, 0 on Coulomb ground
     ("soil", float, (6, SOIL_NUMBERS)),  # this soil
-    ("friction_share", float),  # share of the friction that may be used
+    ("friction_limit", float),  # share of the friction that may be used
     ("radius", float),  # wheel radius [m]
     ("width", float),  # wheel width [m]
     ("weight", float),  # weight of the rover [N]
@@ -77,7 +77,7 @@ SERVO_STATE = record_type(
     ("deviation", float, (MOTIONS,)),  # the motion less its share of the commanded one
     ("towed", float),  # speed share at which it is towed to find the deficit; 0: it is not
     ("deficit", float),  # force that is missing if the speed share is 0, negative: to brake
-    ("stall", np.int64),  # why the rover does not drive if its speed share is 0: a Stall
+    ("stall", np.int64),  # what stops the rover if its speed share is 0: a Stall
 )
 """Inputs, unknowns and results of `solve_servo`. Forces are over the rover's weight, velocities
 over the nominal speed, turning rates in rad per TURN_DISTANCE of nominal distance."""
