@@ -75,7 +75,7 @@ def balance_servos(model, work):
                 mu = effective_friction(soil, own, 0.0)
         work.search.mu[wheel] = mu
         servo.mu[wheel] = settings.friction_limit * mu
-    servo.friction_limit = settings.friction_limit
+    servo.friction_share = settings.friction_limit
     servo.radius, servo.width = linkage.radius, linkage.width
     servo.weight = linkage.mass * linkage.gravity
     return solve_servo(linkage, work, servo)

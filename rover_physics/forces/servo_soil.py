@@ -66,7 +66,7 @@ def roll_on_soil(servo, wheel, velocity):
         return
     strength, resistance = _bear_load(servo, wheel, load)
     facing, turning = direction_of_travel(along, servo.creep)
-    push = 1.0 - servo.friction_limit, resistance[0] * facing
+    push = 1.0 - servo.friction_share, resistance[0] * facing
     curve = strength[0], strength[2], HARDEST * servo.creep
     rim, held = _find_rim_speed(servo, wheel, (curve, push, velocity))
     servo.slip[wheel] = along - rim
@@ -97,7 +97,7 @@ def _bear_load(servo, wheel, load):
     exponent = 2.0 / (2.0 * soil[EXPONENT] + 1.0)
     resistance_rate = (soil[EXPONENT] + 1.0) * exponent * resistance / N
     length = contact_length(radius, sinkage)
-    half = 0.5 * servo.friction_limit / weight
+    half = 0.5 * servo.friction_share / weight
     if sinkage >= radius:  # sunk to its axle, a wheel has no thrust
         strength, strength_rate, length_rate = 0.0, 0.0, 0.0
     else:
@@ -287,7 +287,7 @@ def _write_forces(servo, wheel, state, signed, ends):
     """
     (half, half_rate, _, length_rate), held = state
     one, two = ends
-    force, rate, share = servo.force[wheel], servo.force_rate[wheel], servo.friction_limit
+    force, rate, share = servo.force[wheel], servo.force_rate[wheel], servo.friction_share
     force[T] = half * (one[0] + two[0]) - share * signed[0]
     force[S] = half * (one[1] + two[1])
     force[D] = half * (one[0] - two[0])

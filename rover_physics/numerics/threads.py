@@ -37,7 +37,7 @@ def run_chunks(sweep: Callable[..., Any], inputs: tuple, chunks: int, threads: i
     """Run the chunks of a sweep, each once.
 
     Args:
-        sweep: Kernel of a sweep. Its last arguments are the first chunk and the one after the last.
+        sweep: Kernel of a sweep. Its last arguments are the first chunk and the one after it.
         inputs: Its other arguments.
         chunks: Number of chunks.
         threads: Number of threads. They take one chunk after another, as poses cost differently.

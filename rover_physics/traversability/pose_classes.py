@@ -144,9 +144,10 @@ def _find_classes(
         results = unwritten_results(len(works))
         for k, first in enumerate(range(0, len(poses), PART)):
             check_interruption()
-            part, own = slice(first, first + PART), slice(k % len(works), k % len(works) + 1)
-            asked, places = (models, limits, starts, ranks), (poses[part], AHEAD)
-            yield partial(classify_all, *asked, *places, works[own], results[own], classes[part])
+            part, own = slice(first, first + PART), k % len(works)
+            space = works[own : own + 1], results[own : own + 1]
+            asked = models, limits, starts, ranks, poses[part], AHEAD
+            yield partial(classify_all, *asked, *space, classes[part])
 
     with limit_threads(packed[0].relative_cost(len(poses))) as threads:
         run_in_turn(parts(new_works(threads, CHUNK * CALLS_IN_WORK * threads)), threads)
