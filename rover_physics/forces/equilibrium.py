@@ -108,43 +108,45 @@ def write_equations(linkage, placement, contacts, columns, balance):
     A, B, units = balance.A, balance.B, balance.units
     common, free = balance.shares.common, balance.shares.free
     _write_frames(placement, contacts, balance.frames)
-    A[:, :] = 0.0
-    B[:, :] = 0.0
     for wheel in range(6):
-        for kind in range(3):
-            _write_unit(linkage, placement, contacts, balance, wheel, kind)
-        for row in range(UNKNOWNS):
-            A[row, wheel] += units[wheel, 0, row]
-            A[row, 6] += common[wheel, 0] * units[wheel, 2, row]
-            A[row, 7] += common[wheel, 1] * units[wheel, 2, row]
-            A[row, 8] += common[wheel, 2] * units[wheel, 1, row]
-            if wheel < min(columns - 1, FREE_TORQUES):
-                B[row, 1 + wheel] -= units[wheel, 1, row]
-    for k in range(columns - 1 - FREE_TORQUES):
-        for row in range(UNKNOWNS):
-            B[row, 1 + FREE_TORQUES + k] -= units[free[k], 2, row]
+        _write_units(linkage, placement, contacts, balance, wheel)
+    for row in range(UNKNOWNS):
+        share, slope, traction = 0.0, 0.0, 0.0
+        for wheel in range(6):
+            A[row, wheel] = units[wheel, 0, row]
+            share += common[wheel, 0] * units[wheel, 2, row]
+            slope += common[wheel, 1] * units[wheel, 2, row]
+            traction += common[wheel, 2] * units[wheel, 1, row]
+        A[row, 6], A[row, 7], A[row, 8], B[row, 0] = share, slope, traction, 0.0
+        for k in range(1, columns):
+            wheel, kind = k - 1, 1
+            if k > FREE_TORQUES:
+                wheel, kind = free[k - 1 - FREE_TORQUES], 2
+            B[row, k] = -units[wheel, kind, row]
     _add_weights(linkage, placement, B)
     if linkage.has_tool_load:
         _add_tool_load(linkage, placement, B)
 
 
 @kernel
-def _write_unit(linkage, placement, contacts, balance, wheel, kind):
-    """Write the terms of a wheel's unit force N, T or S (kind 0, 1 or 2) in the nine equations."""
+def _write_units(linkage, placement, contacts, balance, wheel):
+    """Write the terms of the unit forces N, T and S of a wheel in the nine equations."""
     R, length, side = placement.R, linkage.length, wheel // 3
-    unit, frame = balance.units[wheel, kind], balance.frames[wheel, kind]
     x, y, z = difference(contacts.point[wheel], placement.origin)
-    force = frame[0], frame[1], frame[2]
-    moment = cross((x / length, y / length, z / length), force)
-    about_axis = dot(moment, (R[0, 1], R[1, 1], R[2, 1]))
-    unit[0], unit[1], unit[2] = force
-    unit[3], unit[4], unit[5] = moment
-    unit[6] = unit[7] = 0.0
-    if linkage.on_bogie[wheel]:
-        about = _moment_about(linkage, placement, placement.bogie_pivots[side], force)
-        unit[6 + side] = about_axis - about
-    about = _moment_about(linkage, placement, placement.rocker_pivots[side], force)
-    unit[8] = rocker_sign(side) * (about_axis - about)
+    arm = x / length, y / length, z / length
+    for kind in range(3):
+        unit, frame = balance.units[wheel, kind], balance.frames[wheel, kind]
+        force = frame[0], frame[1], frame[2]
+        moment = cross(arm, force)
+        about_axis = dot(moment, (R[0, 1], R[1, 1], R[2, 1]))
+        unit[0], unit[1], unit[2] = force
+        unit[3], unit[4], unit[5] = moment
+        unit[6] = unit[7] = 0.0
+        if linkage.on_bogie[wheel]:
+            about = _moment_about(linkage, placement, placement.bogie_pivots[side], force)
+            unit[6 + side] = about_axis - about
+        about = _moment_about(linkage, placement, placement.rocker_pivots[side], force)
+        unit[8] = rocker_sign(side) * (about_axis - about)
 
 
 @kernel
