@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_planner.command import shared
-from rover_planner.command.shared import argument, option
+from rover_planner.command.shared import argument, option, picture_option
 from rover_planner.shell.extras import need
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def learn(
     log: Annotated[Path, argument("LOG", "The drive: a CSV file, or a bag.")],
     out: Annotated[Path, argument("OUT", "What was learned, .json; is overwritten.")],
     picture: Annotated[
-        Path | None, option("FILE", "Draw it along the way, .png, .svg or .pdf.")
+        Path | None, picture_option("Draw it along the way, .png, .svg or .pdf.")
     ] = None,
     ground: Annotated[
         Path | None, option("FILE", "Write the terrain with layers friction, friction_std, .npz.")
@@ -64,10 +64,6 @@ def learn(
     told = model.friction if friction is None else friction
     if not 0.0 < told < np.inf:
         raise PlanningError(f"--friction is {told:g}; it must be above 0")
-    if picture is not None:
-        from rover_planner.figures.pictures import check_picture
-
-        check_picture(picture)
     rows = _read_log(log, model, odometry_topic)
     check_angles(rows, log)
     learner = GroundLearner(model, map_, told, soil)
@@ -92,7 +88,7 @@ def learn(
         learned_map = replace(map_, friction=np.where(np.isfinite(mean), mean, known))
         save_terrain(ground, learned_map, friction_std=std)
     if picture is not None:
-        from rover_planner.figures.learning_picture import draw_learning
+        from rover_planner.figures.path_pictures import draw_learning
 
         draw_learning(picture, map_, np.array(places), estimates, mean)
     found = learner.estimate.friction

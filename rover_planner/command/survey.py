@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_planner.command import shared
-from rover_planner.command.shared import argument, flag, option
+from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.extras import need
 from rover_planner.shell.run_program import EXIT_FAILED, EXIT_OK, end_as_by_ctrl_c, end_with
 
@@ -59,7 +59,7 @@ def survey(
     geotiff: Annotated[
         Path | None, option("FOLDER", "Write each layer as GeoTIFF (COG), too.")
     ] = None,
-    picture: Annotated[Path | None, option("FILE", "Draw the classes on the map, .png.")] = None,
+    picture: Annotated[Path | None, picture_option("Draw the classes on the map, .png.")] = None,
     max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> int:
     """Judge a rover at all cells of a map and all headings; write the results to a Zarr store.
@@ -70,8 +70,6 @@ def survey(
         need(module, "a survey")
     if geotiff is not None or Path(map_name).suffix.lower() in (".tif", ".tiff"):
         need("rasterio", "a GeoTIFF")
-    if picture is not None:
-        need("matplotlib", "the picture of a survey")
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_planner.survey.dask_cluster import ClusterSettings, check_settings
@@ -94,10 +92,6 @@ def survey(
         from rover_planner.survey.cog import make_folder
 
         make_folder(geotiff)
-    if picture is not None:
-        from rover_planner.figures.pictures import check_picture
-
-        check_picture(picture)
     with end_as_by_ctrl_c():
         prepared = prepare_survey(request, map_name, out, chunk, max_cells, max_gap, settings)
         began, outcome = time.monotonic(), SurveyOutcome()
@@ -148,4 +142,4 @@ def _run(prepared: "PreparedSurvey", settings: "ClusterSettings") -> "SurveyOutc
         cells = (rows.stop - rows.start) * (columns.stop - columns.start)
         total += cells * job.request.headings
     with show_bar("survey", total, "poses") as advance:
-        return run_survey(job, prepared.chunks, settings, lambda report: advance(report.poses))
+        return run_survey(job, prepared.chunks, settings, advance)
