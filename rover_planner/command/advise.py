@@ -86,7 +86,7 @@ def advise(
     assert advice is not None
     _write(out, advice.to_dict())
     if picture is not None:
-        from rover_planner.figures.advice_picture import draw_advice
+        from rover_planner.figures.path_pictures import draw_advice
 
         draw_advice(picture, advice, Path(terrain).name)
     _print_table(advice)

@@ -118,7 +118,7 @@ def _ask(
         assumed = assume(site.rover, site.options.model, site.options.map_sigmas)
         write_prediction(out, answer.path.prediction, answer.path.verdict, assumptions=assumed)
     if picture is not None:
-        from rover_planner.figures.path_picture import draw_path
+        from rover_planner.figures.path_pictures import draw_path
 
         draw_path(picture, question, answer, map_name)
     if answer.warning:

@@ -7,15 +7,15 @@ table come from the service. The candidate paths in the picture are recomputed i
 """
 
 import dataclasses
-import importlib.util
 import json
 import os
 import random
+import signal
 import socket
-import time
+import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.markup import escape
@@ -32,12 +32,15 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.demo.goals import Mission, Pose, choose_mission
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.known_map import describe_terrain
+from rover_planner.planning.path_query import PathAnswer, add_path
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import find_path
+from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.search.site import Site
+from rover_planner.shell.extras import need
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-
-if TYPE_CHECKING:
-    from rover_planner.planning.path_query import PathAnswer
 
 COMPILER = "rover_physics.warm_up"
 """Module that compiles the kernels when it is run."""
@@ -99,11 +102,12 @@ def run_demo(
         The server's verdict on each goal.
 
     Raises:
-        PlanningError, RoverError: Bad input.
-        DemoError: ROS 2 is missing, or a process failed.
+        PlanningError, RoverError: Bad input, or ROS 2 or matplotlib is missing.
+        DemoError: A process failed.
     """
     steps = Steps()
-    _check_environment()
+    need("rclpy", "the demo")
+    need("matplotlib", "the picture of the demo")
     _prepare_folder(picture)
     rover = load_rover(rover_name)
     map_name, terrain = _prepare_map(steps, map_name, picture.parent, seed)
@@ -129,19 +133,6 @@ def run_demo(
     return answers
 
 
-def _check_environment() -> None:
-    """Raise DemoError if ROS 2 or matplotlib is missing."""
-    for module, what in (
-        ("rclpy", "ROS 2 Jazzy"),
-        ("nav_msgs", "nav_msgs"),
-        ("matplotlib", "matplotlib"),
-    ):
-        if importlib.util.find_spec(module) is None:
-            raise DemoError(
-                f"the demo needs {what}, which is not there: source ROS 2, or pip install .[all]"
-            )
-
-
 def _prepare_folder(picture: Path) -> None:
     """Create the picture's folder and check that the picture can be written."""
     if picture.suffix.lower() not in (".png", ".svg", ".pdf"):
@@ -160,17 +151,14 @@ def _prepare_map(
     steps: Steps, map_name: str | None, folder: Path, seed: int
 ) -> tuple[str, Terrain]:
     """Load the map, or generate and save one; return its name and terrain."""
-    if map_name is not None:
-        with steps.step(f"load the map {escape(map_name)}") as status:
-            terrain = load_terrain(map_name)
-            status.update(f"{status.status}: {describe_terrain(terrain)}")
-        return map_name, terrain
-    with steps.step(f"make a Mars-like terrain, seed {seed}") as status:
-        path = folder / "terrain.npz"
-        save_terrain(path, make_mars_terrain(seed))
-        terrain = load_terrain(path)
+    name = str(folder / "terrain.npz") if map_name is None else map_name
+    made, loaded = f"make a Mars-like terrain, seed {seed}", f"load the map {escape(name)}"
+    with steps.step(made if map_name is None else loaded) as status:
+        if map_name is None:
+            save_terrain(name, make_mars_terrain(seed))
+        terrain = load_terrain(name)
         status.update(f"{status.status}: {describe_terrain(terrain)}")
-    return str(path), terrain
+    return name, terrain
 
 
 def _as_the_server_knows_it(terrain: Terrain, max_gap: float) -> Terrain:
@@ -219,8 +207,6 @@ def _compile(stage: Stage) -> None:
     """Compile the kernels in a child process, which can be stopped at any time."""
     with stage.steps.step("compile the model's kernels (the first time takes a while)"):
         child = stage.start(COMPILER)
-        for _ in child.lines(lambda: None):
-            pass
         _expect_success(child)
 
 
@@ -258,15 +244,16 @@ def _join(pose) -> str:
 def _events(planner: ChildProcess, server: ChildProcess) -> Iterator[dict[str, Any]]:
     """Yield the mission planner's events; raise DemoError if the server ends."""
 
-    def watch() -> None:
-        if not server.running:
-            raise DemoError(
-                f"{server.name} ended with code {server.exit_code}: {server.last_line()} "
-                f"(see {server.log})"
-            )
+    def end_together() -> None:
+        server.wait()
+        if planner.running:
+            planner.send_signal(signal.SIGTERM)
 
-    for line in planner.lines(watch):
+    threading.Thread(target=end_together, daemon=True).start()
+    for line in planner.lines():
         yield json.loads(line)
+    if not server.running:
+        raise _failure_of(server)
 
 
 def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess) -> None:
@@ -278,13 +265,15 @@ def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess)
 
 def _expect_success(child: ChildProcess) -> None:
     """Wait until a child has ended; raise DemoError if it failed."""
-    while child.running:
-        time.sleep(0.02)
-    if child.exit_code != EXIT_OK:
-        raise DemoError(
-            f"{child.name} ended with code {child.exit_code}: {child.last_line()} "
-            f"(see {child.log})"
-        )
+    if child.wait() != EXIT_OK:
+        raise _failure_of(child)
+
+
+def _failure_of(child: ChildProcess) -> DemoError:
+    """Return the error that tells how a child has ended."""
+    return DemoError(
+        f"{child.name} ended with code {child.exit_code}: {child.last_line()} (see {child.log})"
+    )
 
 
 def _draw(
@@ -310,14 +299,8 @@ def _draw(
     )
 
 
-def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> "PathAnswer":
+def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> PathAnswer:
     """Return the best candidate path, or if all are refused the one that a search finds."""
-    from rover_planner.planning.path_query import add_path
-    from rover_planner.planning.search.judge import PathJudge
-    from rover_planner.planning.search.path_search import find_path
-    from rover_planner.planning.search.query import SearchQuery
-    from rover_planner.planning.search.site import Site
-
     site = Site(rover, ground)
     answer = PathJudge(site).search(start, goal)
     if answer.traversable or not ground.contains(*goal[:2]):

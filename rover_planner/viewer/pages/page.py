@@ -23,7 +23,7 @@ from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import Step
-from rover_planner.viewer.state.layers import PREDICTED, Colouring, LayerRequest
+from rover_planner.viewer.state.layers import PREDICTED, Colouring
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -53,7 +53,6 @@ class Page(PageBase):
         self._opening: tuple[sharing.PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
-        self._sliders: paths.Sliders = {}
         asked = session.wanted
         super().__init__(asked.rover, asked.terrain, address, ground_name, survey)
         self._advice = self.begin_work(self._take_advice, "advice")
@@ -75,9 +74,9 @@ class Page(PageBase):
 
     def paint(self) -> None:
         """Begin to colour the ground with what is shown on it."""
-        path, now = self.session.shown.path.poses, self.session.shown.scenario
-        asked = LayerRequest(now.rover, now.terrain, self.colouring, now.options.model, path)
-        self.painter.ask(paint(asked, self.survey))
+        shown = self.session.shown
+        site, path = shown.scenario.site, shown.path.poses
+        self.painter.ask(paint(site, self.colouring, path, self.survey))
 
     # What visitors ask.
 
@@ -130,27 +129,18 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        parts = self._find_sliders().values()
+        session = self.session
+        parts = paths.list_sliders(session.wanted.loaded).values()
         found = [one for values in parts for one in values if one.label == label]
         if not found:
             raise PlanningError(f"the rover has no number {label!r}")
-        (one,), session = found, self.session
-        number = min(max(number, one.low), one.high)
+        (one,) = found
         kind, name, *_ = (*one.keys[0], "")
         if kind == paths.JOINTS:
             angles = {**session.wanted.arm, str(name): number}
             session.take_change(session.wanted.change_options(joint_angles=angles))
         else:
             session.change_rover(one.keys, number)
-
-    def _find_sliders(self) -> paths.Sliders:
-        """Return the sliders of the rover; their ends include all that was wanted of it."""
-        wanted = self.session.wanted
-        if self.has_changed("loaded", wanted.loaded):
-            self._sliders = paths.list_sliders(wanted.loaded)
-        if self.has_changed("wanted", wanted):
-            self._sliders = paths.widen_sliders(self._sliders, wanted)
-        return self._sliders
 
     def _cancel(self) -> None:
         self.session.is_stopped |= self._judging.cancel()
@@ -345,7 +335,7 @@ class Page(PageBase):
         helps = advice.describe_advice(self._advised, is_seeking, time.monotonic())
         tell("advice", None if shown.verdict.traversable else helps)
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
-        made("sliders", lambda now: paths.describe_sliders(now, wanted), self._find_sliders())
+        made("sliders", lambda _: paths.describe_sliders(wanted), wanted.loaded)
         made("values", paths.read_values, wanted)
         made("changes", paths.describe_changes, path, reference, session.kept is not None)
         made("limits", paths.describe_limits, path, reference, shown.chance)

@@ -13,11 +13,10 @@ from scipy import ndimage
 from rover_physics.limits.table import LIMITS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.map_sweep import score_poses
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.search.site import Site
 from rover_planner.viewer.state.colours import REFUSED, UNKNOWN, map_colours, to_css
 
 MAX_CELLS = 250
@@ -86,22 +85,6 @@ class Colouring:
 
 
 @dataclass(frozen=True, eq=False)
-class LayerRequest:
-    """A layer of a ground."""
-
-    rover: Rover
-    """The rover, for layers that are predicted."""
-    terrain: Terrain
-    """The ground."""
-    how: Colouring
-    """The layer."""
-    options: SweepOptions = DEFAULT_OPTIONS
-    """Options of the model for predicted layers."""
-    path: Floats | None = None
-    """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
-
-
-@dataclass(frozen=True, eq=False)
 class ColouredGround:
     """The colours of a layer, and what they mean."""
 
@@ -134,7 +117,9 @@ def colour_ground(layer: str, ground: Terrain) -> ColouredGround:
     return ColouredGround(colours, _grade(layer, ends))
 
 
-def colour_limit(request: LayerRequest, ground: Terrain) -> ColouredGround:
+def colour_limit(
+    site: Site, how: Colouring, ground: Terrain, path: Floats | None = None
+) -> ColouredGround:
     """Return the colours of the use of a limit with the rover at each place of a thinned ground.
 
     The model is asked at MAX_PREDICTED places along a side; all others are as the nearest.
@@ -142,9 +127,9 @@ def colour_limit(request: LayerRequest, ground: Terrain) -> ColouredGround:
     Raises:
         RoverError: The model refuses an option.
     """
-    size, how = count_pixels(ground), request.how
+    size = count_pixels(ground)
     rows, columns = (min(count, MAX_PREDICTED) for count in size)
-    used = predict_use(request, spread(ground, (rows, columns)))
+    used = predict_use(site, how, spread(ground, (rows, columns)), path)
     colours = map_colours(used, 0.0, 1.0)
     colours[used > 1.0] = REFUSED
     words = "along the path" if how.along else f"at heading {how.heading:g} deg"
@@ -163,12 +148,16 @@ def _grade(title: str, ends: tuple[str, ...], *keys: tuple[str, str]) -> dict[st
     return {"title": title, "keys": keys, "gradient": gradient, "ends": ends, "notes": []}
 
 
-def predict_use(request: LayerRequest, at: Sequence[Floats]) -> Floats:
+def predict_use(
+    site: Site, how: Colouring, at: Sequence[Floats], path: Floats | None = None
+) -> Floats:
     """Return the use of the limit of a layer with the rover at each point.
 
     Args:
-        request: Rover, ground, layer and heading.
+        site: Rover and ground, with the options of the model.
+        how: Layer and heading.
         at: x (nx,) and y (ny,) of the points [m].
+        path: (n, 3) poses whose yaw the rover has if the layer is for the heading of a path.
 
     Returns:
         Uses (ny, nx), NaN where the rover does not settle or the limit is not asked.
@@ -178,13 +167,13 @@ def predict_use(request: LayerRequest, at: Sequence[Floats]) -> Floats:
     """
     from scipy.spatial import cKDTree
 
-    (x, y), how, path = np.meshgrid(*at), request.how, request.path
+    x, y = np.meshgrid(*at)
     yaw, code = np.full_like(x, np.radians(how.heading)), PREDICTED[how.layer]
     if how.along and path is not None:  # as at the nearest waypoint
         _, nearest = cKDTree(path[:, :2]).query(np.stack([x, y], axis=-1))
         yaw = path[nearest, 2]
     poses = np.stack([x, y, yaw], axis=-1)
-    scores = score_poses(request.rover, request.terrain, poses, request.options)
+    scores = score_poses(site.rover, site.terrain, poses, site.options.model)
     of_limit = [code in ("", row.code) for row in scores.limits.rows]
     used = np.fmax.reduce(scores.uses[..., of_limit], axis=-1, initial=np.nan)
     return np.where(scores.status == PoseStatus.SETTLED, used, np.nan)
