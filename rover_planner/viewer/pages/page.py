@@ -25,10 +25,9 @@ from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import Step
-from rover_planner.viewer.state.layers import PREDICTED, Colouring
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, ShownSurvey
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
-from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 NOTICE_DELAY = 0.2
 """Time without a result after which the page tells what it judges, and greys what is old [s]."""
