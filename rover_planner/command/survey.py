@@ -142,4 +142,4 @@ def _run(prepared: "PreparedSurvey", settings: "ClusterSettings") -> "SurveyOutc
         cells = (rows.stop - rows.start) * (columns.stop - columns.start)
         total += cells * job.request.headings
     with show_bar("survey", total, "poses") as advance:
-        return run_survey(job, prepared.chunks, settings, lambda report: advance(report.poses))
+        return run_survey(job, prepared.chunks, settings, advance)
