@@ -81,9 +81,9 @@ def view(
     from rover_physics.rover.rover_file import load_rover
     from rover_planner.viewer.pages.base import check_host
     from rover_planner.viewer.pages.page import Page
+    from rover_planner.viewer.state.layers import ShownSurvey, load_map
     from rover_planner.viewer.state.scenario import Scenario
     from rover_planner.viewer.state.session import ViewSession
-    from rover_planner.viewer.state.survey_layers import ShownSurvey, load_map
 
     model = load_rover(rover)
     check_host(host)
