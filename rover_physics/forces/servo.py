@@ -5,7 +5,7 @@ The unknowns are the six wheel loads and the rover's motion (forward, left, turn
 contacts, see servo_motion. Where no load keeps a wheel down, its speed of lifting takes the place
 of the load: the treads of the others then move so much differently that the forces balance. The
 motion gives the sliding velocity of each wheel and with it the friction force, by servo_wheel or,
-on yielding soil, by servo_soil. The nine equations are those of equilibrium. A wheel that has to
+on yielding soil, by servo_ground. The nine equations are those of equilibrium. A wheel that has to
 travel farther than its neighbours is dragged, and others push; a wheel at its friction or torque
 limit leaves the rest to the others; wheels that cannot roll where they are moved skid.
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from rover_physics.forces.equilibrium import write_equations
 from rover_physics.forces.servo_balance import STRETCH, contact_velocity, motion_made
+from rover_physics.forces.servo_ground import direction_of_travel
 from rover_physics.forces.servo_motion import MOTIONS, TURN_DISTANCE, WEIGHTS, find_motions
 from rover_physics.forces.servo_search import CREEP, find_drive, search_everywhere
-from rover_physics.forces.servo_soil import direction_of_travel
 from rover_physics.forces.servo_wheel import D, S, T
 from rover_physics.forces.shares import write_shares
 from rover_physics.forces.soil import (

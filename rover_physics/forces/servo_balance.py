@@ -4,8 +4,7 @@
 import numpy as np
 
 from rover_physics.forces.servo_motion import MOTIONS, SCRUB, UNKNOWNS, WEIGHTS, level_work
-from rover_physics.forces.servo_soil import roll_on_soil
-from rover_physics.forces.servo_wheel import ACROSS, ALONG, GRIP, SPIN, D, S, T, roll_wheel
+from rover_physics.forces.servo_wheel import ACROSS, ALONG, LOAD, SPIN, D, S, T, roll_wheel
 from rover_physics.numerics.kernels import kernel
 
 STRETCH = 0.05
@@ -32,10 +31,7 @@ def write_residual(servo, z):
         velocity = contact_velocity(servo, wheel, z)
         if not servo.holds_loads:
             servo.pressing[wheel] = servo.load[wheel]
-        if servo.yields[wheel]:
-            roll_on_soil(servo, wheel, velocity)
-        else:
-            roll_wheel(servo, wheel, servo.mu[wheel] * servo.pressing[wheel], velocity)
+        roll_wheel(servo, wheel, velocity)
         if servo.pressing[wheel] > 0.0:
             _add_wheel(servo, wheel)
     if servo.towed > 0.0:
@@ -95,16 +91,13 @@ def contact_velocity(servo, wheel, z):
 def _add_wheel(servo, wheel):
     """Add the forces of a wheel to the residual, and their derivatives to the Jacobian."""
     X, J, force, rate = servo.X, servo.J, servo.force[wheel], servo.force_rate[wheel]
-    velocity, grip_rate = servo.velocity[wheel], servo.load_rate[wheel]
-    if servo.holds_loads:
-        grip_rate = 0.0
-    elif not servo.yields[wheel]:
-        grip_rate *= servo.mu[wheel]
+    velocity = servo.velocity[wheel]
+    load_rate = 0.0 if servo.holds_loads else servo.load_rate[wheel]
     for i in range(UNKNOWNS):
         x_T, x_S, x_D = X[i, wheel], X[i, 6 + wheel], X[i, SCRUB + wheel]
         servo.residual[i, 0] += x_T * force[T] + x_S * force[S] + x_D * force[D]
-        J[i, wheel] += grip_rate * (
-            x_T * rate[T, GRIP] + x_S * rate[S, GRIP] + x_D * rate[D, GRIP]
+        J[i, wheel] += load_rate * (
+            x_T * rate[T, LOAD] + x_S * rate[S, LOAD] + x_D * rate[D, LOAD]
         )
         along = x_T * rate[T, ALONG] + x_S * rate[S, ALONG] + x_D * rate[D, ALONG]
         across = x_T * rate[T, ACROSS] + x_S * rate[S, ACROSS] + x_D * rate[D, ACROSS]

@@ -12,8 +12,8 @@ convex on firm ground, and has one solution (Necas, Jarusek and Haslinger, Bolle
 import numpy as np
 
 from rover_physics.forces.servo_balance import motion_made, split_loads, write_residual
+from rover_physics.forces.servo_ground import speed_of_thrust
 from rover_physics.forces.servo_motion import MOTIONS, UNKNOWNS, WEIGHTS, level_work
-from rover_physics.forces.servo_soil import speed_of_thrust
 from rover_physics.limits.table import MIN_SPEED_SHARE
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import solve_in_place
