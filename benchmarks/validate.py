@@ -23,7 +23,6 @@ from rover_physics import (
     PathPrediction,
     Rover,
     SweepOptions,
-    Terrain,
     Verdict,
     judge_path,
     judge_poses,
@@ -35,11 +34,11 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.traversability.verdict import hold_against_limits
 from support.paths import arc_of, poses_at
 from support.reference_cases import DATA, STEERED, reference_predictions
-from support.reference_drives import KEPT, drive_ground, drive_path, unlimited
+from support.reference_drives import KEPT, drive_path, unlimited
 
 PASSED = "passed"
 GROUNDS = {"ramp": "slope", "tilt": "cross_slope", "rocks": "caps"}
-"""Grounds of drives that curves have, by the name they have there."""
+"""Kinds of grounds, by the name that curves have for them."""
 DRIVES = {"drive": "", "mu": "", "limit [N m]": ".2f", "in MuJoCo": "", "ended at x [m]": ".2f"}
 CURVES = {"curve": "", "mu": "", "path in MuJoCo": ""}
 """Columns of tables beside the verdict."""
@@ -84,22 +83,14 @@ def judge_drives(policy: str) -> Iterator[tuple[ReferenceDrive, Verdict]]:
         yield drive, hold_against_limits(rover, prediction)
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Curve(Obstacle):
     """One drive of the rover lsr1 along an arc or a turn on the spot."""
 
-    kind: str
-    """flat, tilt, ramp, step or rocks."""
-    size: float
-    """Angle [deg], height [m] or seed."""
     mode: str
     """steered, spot, skid or skid_spot."""
     curvature: float
     """[1/m], infinite on the spot."""
-    friction: float
-    """Friction coefficient."""
-    max_torque: float
-    """Torque limit of the speed servos [N m]."""
     start: np.ndarray
     """(3,) x, y [m], yaw [rad]."""
     kept: bool
@@ -118,25 +109,10 @@ class Curve:
         return label, self.friction, "kept" if self.kept else "left"
 
     @property
-    def steered(self) -> bool:
-        """True if the end wheels steer."""
-        return self.mode in ("steered", "spot")
-
-    @property
-    def ground(self) -> Terrain:
-        """The ground."""
-        return drive_ground(GROUNDS.get(self.kind, self.kind), self.size)
-
-    @property
     def rover(self) -> Rover:
         """The rover, without limits that MuJoCo lacks."""
         rover = unlimited(load_rover("lsr1"))
-        return rover if self.steered else replace(rover, steering=None)
-
-    @property
-    def options(self) -> SweepOptions:
-        """The options under policy "servo"."""
-        return SweepOptions(policy="servo", friction=self.friction, max_torque=self.max_torque)
+        return replace(rover, steering=None) if "skid" in self.mode else rover
 
     @property
     def path(self) -> np.ndarray:
@@ -149,8 +125,8 @@ class Curve:
 
     def predict_trace(self) -> PathPrediction:
         """Return the prediction at the poses of the trace."""
-        curvatures = np.full(len(self.poses), self.curvature)
-        return judge_poses(self.rover, self.ground, self.poses, curvatures, self.options)[0]
+        curvatures, options = np.full(len(self.poses), self.curvature), self.options("servo")
+        return judge_poses(self.rover, self.ground, self.poses, curvatures, options)[0]
 
 
 @lru_cache
@@ -163,7 +139,7 @@ def _read(row: dict) -> Curve:
     trace = row["trace"]
     away = np.subtract(row["end"], row["nominal_end"])[:2]
     return Curve(
-        kind=row["kind"],
+        kind=GROUNDS.get(row["kind"], row["kind"]),
         size=row["size"],
         mode=row["mode"],
         curvature=float(row["kappa"]),
@@ -320,7 +296,7 @@ def main(
         with console(stderr=True).status(f"drives, {policy}"):
             print_differences(f"Drives under {policy} torques", DRIVES, [*judge_drives(policy)])
     curves = [
-        (curve, judge_path(curve.rover, curve.ground, curve.path, curve.options)[1])
+        (curve, judge_path(curve.rover, curve.ground, curve.path, curve.options("servo"))[1])
         for curve in read_curves()
     ]
     print_differences("Curves under servo torques", CURVES, curves)

@@ -109,7 +109,7 @@ def find_failure_chance(
     if model.options.policy == OPTIMAL:
         groups = tuple(one.weaken() for one in groups)
     around = AROUND * model.rover.uncertainty.position if on_path else 0.0
-    on_path &= model.wheels.on_servos
+    on_path &= model.on_servos
     asked, on_path = _find_asked(model, swept, rows, groups, on_path, around)
     settled = rows.results["status"] == PoseStatus.SETTLED
     failed = np.zeros((SAMPLES if len(asked) else 1, n), bool)
@@ -269,10 +269,10 @@ def _evaluate(
             found = model.evaluate_variants(variants, poses[here], motions[here], rows.held[here])
             for to, one in zip(results, found.T, strict=True):
                 place_results(np.ascontiguousarray(one), to, here)
-    for name in OF_PATH if model.wheels.on_servos else (*OF_PATH, *OF_SLOTS):
+    for name in OF_PATH if model.on_servos else (*OF_PATH, *OF_SLOTS):
         results[name] = rows.results[name]
     results["torque_saturation"] /= np.array([[one.torques] for one in group.samples])
-    if model.wheels.on_servos:
+    if model.on_servos:
         results["torque_share"] = results["torque_saturation"].mean(axis=2)
     lost = np.isin(results["status"], OFF_KNOWN_GROUND).any(axis=0)
     if lost.any() and group.shift.any():

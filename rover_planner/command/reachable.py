@@ -33,6 +33,7 @@ def reachable(
     if place is None:
         raise PlanningError(f"--from is {start!r}; it must be two numbers: X,Y or X Y")
     from rover_planner.shell.progress import show_progress
+    from rover_planner.survey.cog import write_cog
     from rover_planner.survey.reachable import explain_no_area, find_reachable
     from rover_planner.survey.store import SurveyStore
 
@@ -42,8 +43,6 @@ def reachable(
         area = find_reachable(opened, place[0], place[1], report=progress)
     notes, end = opened.notes, None
     if geotiff is not None:
-        from rover_planner.survey.cog import write_cog
-
         write_cog(geotiff, area.distance, notes.frame, notes.layout.step)
     if picture is not None:
         from rover_planner.figures.survey_picture import draw_reachable

@@ -81,9 +81,9 @@ def view(
     from rover_physics.rover.rover_file import load_rover
     from rover_planner.viewer.pages.base import check_host
     from rover_planner.viewer.pages.page import Page
+    from rover_planner.viewer.state.layers import ShownSurvey, load_map
     from rover_planner.viewer.state.scenario import Scenario
     from rover_planner.viewer.state.session import ViewSession
-    from rover_planner.viewer.state.survey_layers import ShownSurvey, load_map
 
     model = load_rover(rover)
     check_host(host)
@@ -204,53 +204,35 @@ def _load_or_make(name: str | None, follow: bool, max_cells: int) -> "Terrain":
 def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
     """Return a start and a goal where the rover can stand, with known ground between them.
 
-    They are on both sides of the middle of the map if the rover can stand there on known ground.
-    Otherwise they are the demo's start and its farthest goal on plain ground. If the map has no
-    such ground, they are on both sides of the middle anyway, and the page shows the reason.
-    """
-    import numpy as np
-
-    from rover_planner.demo.goals import choose_mission
-
-    low, high = _ends_about_the_middle(rover, ground)
-    between = np.linspace(low[:2], high[:2], PLACES_TRIED)
-    if np.isfinite(ground.elevation_at(between[:, 0], between[:, 1])).all():
-        return low, high
-    try:
-        mission = choose_mission(ground, rover)
-    except PlanningError:
-        return low, high
-    plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
-    if not plain:
-        return low, high
-    return mission.start, max(plain, key=partial(math.dist, mission.start))
-
-
-def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
-    """Return two poses where the rover can stand, on both sides of the middle of a map.
-
-    They are the nearest ones to a quarter and three quarters of the map along x, or closer
-    together so that their distance is at most MAX_DEMO_LENGTH. If the rover can stand nowhere, the
-    poses are exactly at these points.
+    They are nearest to a quarter and three quarters of the map along x, or to places closer
+    together, MAX_DEMO_LENGTH apart; where the rover can stand nowhere on a side, they are there.
+    Across unknown ground they are the demo's start and farthest goal on plain ground, if it has
+    any; else they stay, and the page shows the reason.
     """
     import numpy as np
 
     from rover_physics.prediction.map_sweep import score_poses
+    from rover_planner.demo.goals import choose_mission
 
     x_low, x_high, y_low, y_high = ground.bounds
     middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high)])
     half = 0.5 * min(0.5 * (x_high - x_low), MAX_DEMO_LENGTH)
-    x, y = np.meshgrid(
-        np.linspace(x_low, x_high, PLACES_TRIED), np.linspace(y_low, y_high, PLACES_TRIED)
-    )
+    sides = [np.linspace(*ends, PLACES_TRIED) for ends in ((x_low, x_high), (y_low, y_high))]
     wanted = middle + np.array([[-half, 0.0], [half, 0.0]])
-    places = np.vstack([wanted, np.column_stack([x.ravel(), y.ravel()])])
-    poses = np.column_stack([places, np.zeros(len(places))])
-    stands = score_poses(rover, ground, poses).passable
+    places = np.vstack([wanted, np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)])
+    stands = score_poses(rover, ground, np.insert(places, 2, 0.0, axis=1)).passable
     ends: list[End] = []
     for aim, side in zip(wanted, (-1.0, 1.0), strict=True):
         fit = stands & (side * (places[:, 0] - middle[0]) > 0.0)
         away = np.where(fit, np.linalg.norm(places - aim, axis=1), np.inf)
         best = places[np.argmin(away)] if fit.any() else aim
         ends.append((float(best[0]), float(best[1]), 0.0))
+    between = np.linspace(ends[0][:2], ends[1][:2], PLACES_TRIED)
+    plain: list[End] = []
+    if not np.isfinite(ground.elevation_at(between[:, 0], between[:, 1])).all():
+        with contextlib.suppress(PlanningError):  # no place for a mission
+            mission = choose_mission(ground, rover)
+            plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
+    if plain:
+        return mission.start, max(plain, key=partial(math.dist, mission.start))
     return ends[0], ends[1]

@@ -60,27 +60,6 @@ ANSWER_COLUMNS = (
 """Columns of numbers: heading, key of the answer, digits after the point."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Stage:
-    """The child processes of a demo, and what they have in common."""
-
-    steps: Steps
-    """Shows what is being done."""
-    children: list[ChildProcess]
-    """Are stopped when the demo ends."""
-    environment: dict[str, str]
-    """Their environment variables."""
-    folder: Path
-    """Folder of their logs."""
-
-    def start(self, module: str, arguments: Sequence[str] = ()) -> ChildProcess:
-        """Start a module; its log has its name."""
-        log = self.folder / f"{module.rpartition('.')[2]}.log"
-        child = ChildProcess(module, arguments, self.environment, log)
-        self.children.append(child)
-        return child
-
-
 def run_demo(
     map_name: str | None,
     picture: Path,
@@ -114,12 +93,20 @@ def run_demo(
     with steps.step(f"interpolate gaps of the map up to {max_gap:g} m wide") as status:
         ground = _as_the_server_knows_it(terrain, max_gap)
         status.update(f"{status.status}: {np.isfinite(ground.elevation).mean():.0%} known")
-    mission = choose_mission(ground, rover, seed)
+    mission, environment = choose_mission(ground, rover, seed), _environment()
     with stopping_children() as children:
-        stage = Stage(steps, children, _environment(), picture.parent)
-        _compile(stage)
-        server = stage.start(SERVER, _server_parameters(rover_name, max_gap))
-        answers = _ask_server(stage, server, map_name, mission)
+
+        def start(module: str, arguments: Sequence[str] = ()) -> ChildProcess:
+            """Start a module; its log has its name."""
+            log = picture.parent / f"{module.rpartition('.')[2]}.log"
+            children.append(ChildProcess(module, arguments, environment, log))
+            return children[-1]
+
+        with steps.step("compile the model's kernels (the first time takes a while)"):
+            _expect_success(start(COMPILER))
+        server = start(SERVER, _server_parameters(rover_name, max_gap))
+        planner = start(PLANNER, _planner_options(map_name, mission))
+        answers = _ask(steps, server, planner, mission)
         with steps.step("stop the server and the mission planner"):
             for child in reversed(children):
                 child.stop()
@@ -173,6 +160,16 @@ def _server_parameters(rover_name: str, max_gap: float) -> tuple[str, ...]:
     return ("--ros-args", *(word for key in values for word in ("-p", f"{key}:={values[key]}")))
 
 
+def _planner_options(map_name: str, mission: Mission) -> tuple[str, ...]:
+    """Return the command-line arguments that name map, start and goals to the mission planner."""
+    start, *goals = (
+        ",".join(repr(float(value)) for value in pose)
+        for pose in (mission.start, *(goal.pose for goal in mission.goals))
+    )
+    ends = (f"--start={start}", *(f"--goal={goal}" for goal in goals))
+    return ("--json", f"--map={map_name}", *ends)
+
+
 def _environment() -> dict[str, str]:
     """Return the environment of the child processes: an unused DDS domain, localhost only."""
     package_folder = str(Path(rover_planner.__file__).resolve().parents[1])
@@ -203,27 +200,17 @@ def _free_domain() -> int:
     return domains[0]
 
 
-def _compile(stage: Stage) -> None:
-    """Compile the kernels in a child process, which can be stopped at any time."""
-    with stage.steps.step("compile the model's kernels (the first time takes a while)"):
-        child = stage.start(COMPILER)
-        _expect_success(child)
-
-
-def _ask_server(
-    stage: Stage, server: ChildProcess, map_name: str, mission: Mission
+def _ask(
+    steps: Steps, server: ChildProcess, planner: ChildProcess, mission: Mission
 ) -> list[dict[str, Any]]:
-    """Start the mission planner; return the server's verdict on each goal."""
-    with stage.steps.step("start traverse_server and find it over DDS") as status:
-        poses = [f"--goal={_join(goal.pose)}" for goal in mission.goals]
-        asked = ["--json", f"--map={map_name}", f"--start={_join(mission.start)}", *poses]
-        planner = stage.start(PLANNER, asked)
+    """Return the server's verdict on each goal, for which the mission planner asks."""
+    with steps.step("start traverse_server and find it over DDS") as status:
         events = _events(planner, server)
         _skip_to(events, "publishing the map", planner)
         status.update("publish the map over DDS")
         _skip_to(events, "asking", planner)
     answers: list[dict[str, Any]] = []
-    with stage.steps.step(f"ask for {len(mission.goals)} goals") as status:
+    with steps.step(f"ask for {len(mission.goals)} goals") as status:
         for event in events:
             if event["event"] == "answer":
                 answers.append(event["answer"])
@@ -235,10 +222,6 @@ def _ask_server(
         _expect_success(planner)
         raise DemoError(f"{len(answers)} of {len(mission.goals)} goals were answered")
     return answers
-
-
-def _join(pose) -> str:
-    return ",".join(repr(float(value)) for value in pose)
 
 
 def _events(planner: ChildProcess, server: ChildProcess) -> Iterator[dict[str, Any]]:

@@ -33,8 +33,6 @@ SETTINGS = {
 }
 """Settings of Dask's processes on this machine. What they do at rest counts as much as how they
 treat tasks, as there are few of those."""
-NOISY = ("distributed", "tornado", "asyncio")
-"""Beginnings of the names of the logs that are silenced."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,8 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
     asked = SETTINGS | {"distributed.comm.timeouts.connect": CONNECT_TIME}
     with contextlib.ExitStack() as stack:
         stack.enter_context(dask.config.set(asked))
-        stack.enter_context(_silent_logs())
+        stack.callback(logging.disable, logging.root.manager.disable)
+        logging.disable()  # the command tells in one line what Dask would tell on stderr
         if settings.scheduler is not None:
             try:
                 client = Client(settings.scheduler, timeout=CONNECT_TIME)
@@ -120,23 +119,6 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
             )
             stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
-
-
-@contextlib.contextmanager
-def _silent_logs() -> Iterator[None]:
-    """Keep Dask from telling on stderr what the command tells in one line.
-
-    Its settings of logs count only when it is imported.
-    """
-    known = [name for name in logging.root.manager.loggerDict if name.startswith(NOISY)]
-    levels = {name: logging.getLogger(name).level for name in known}
-    for name in known:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for name, level in levels.items():
-            logging.getLogger(name).setLevel(level)
 
 
 def check_machine(notes: StoreNotes, settings: ClusterSettings) -> None:

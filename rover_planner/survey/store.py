@@ -188,12 +188,8 @@ class SurveyStore:
         Raises:
             PlanningError: It has changed, or cannot be read.
         """
-        source = self.open_map()
-        changed = (
-            isinstance(source, GeoTiffMap)
-            and source.hash_content() != self.notes.description["map"]
-        )
-        if changed:
+        source, kept = self.open_map(), self.notes.description["map"]
+        if isinstance(source, GeoTiffMap) and source.hash_content() != kept:
             raise PlanningError(
                 f"{show_file(self.notes.map_file)} has changed since {show_file(self.path)} was "
                 "made"
@@ -323,7 +319,7 @@ def force_to_disk(path: Path, root: Path) -> None:
 
 
 def is_refusal(error: OSError) -> bool:
-    """Return whether the system refuses to write, so that another attempt is of no use."""
+    """Return whether the system refuses to write: then so it does for other chunks."""
     refusals = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG)
     return error.errno in refusals
 

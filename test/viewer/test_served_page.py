@@ -250,13 +250,13 @@ def test_lines_have_the_colours_of_their_strands_and_their_node_stays_until_it_i
 def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
     overlay = page.scene.paths
     trail = np.array([[0.0, 0.0, 0.5], [0.1, 0.0, 0.0], [0.2, 0.0, 1.0]])
-    for known, count in ((None, 0), (trail[:1], 0), (trail, 2)):
+    for known, count in ((trail[:0], 0), (trail[:1], 0), (trail, 2)):
         overlay.show_trail(known)
         node = page.scene.canvas.nodes.get("/lines/trail")
         assert (0 if node is None else len(node.points)) == count
     low, high = node.colors[:, 0].tolist()
     assert low[2] > low[0] and high[0] > high[2]
-    overlay.show_trail(None)
+    overlay.show_trail(trail[:0])
 
 
 # Errors.

@@ -93,8 +93,8 @@ class LivePage(PageBase):
         tell("subject", facts)
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
-        trail = None if data.learned is None else data.learned.places
         draw, old, paths = self.draw_made, bool(answer["old"]), self.scene.paths
+        trail = data.trail
         draw("the trail is not drawn", lambda *_: paths.show_trail(trail), trail, self.ground)
         draw(
             "the plan is not drawn", lambda *_: paths.show_plan(plan, old), plan, old, self.ground

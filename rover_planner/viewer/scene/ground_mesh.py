@@ -16,7 +16,6 @@ from rover_planner.planning.search.site import Site
 from rover_planner.viewer.scene.canvas import find_origin
 from rover_planner.viewer.state import layers
 from rover_planner.viewer.state.background_work import WorkStep
-from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 SHADES = (0.3, 1.25)
 """Least and largest brightness of the ground; 1 where it is level."""
@@ -35,7 +34,7 @@ def paint(
     site: Site,
     how: layers.Colouring,
     path: Floats | None = None,
-    survey: ShownSurvey | None = None,
+    survey: layers.ShownSurvey | None = None,
 ) -> Iterator[WorkStep | tuple[bytes, Mapping[str, Any]]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
