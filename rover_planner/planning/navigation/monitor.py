@@ -18,13 +18,12 @@ from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, SuspensionReport, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.marked_places import MarkedPlaces
 from rover_planner.planning.navigation.watched_path import Place, WatchedPath
-from rover_planner.planning.verdict_report import SuspensionReport
 
 IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
 """States of a monitor."""

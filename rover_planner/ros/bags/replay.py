@@ -13,10 +13,9 @@ from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement, refusal
 from rover_planner.planning.answering.questions import PathQuestion, Register
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
-from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.bags.bag_files import IMU, JOINTS, MAP, ODOMETRY, PATH, TF_STATIC, Recorded
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
 from rover_planner.ros.frames import Frames
