@@ -101,17 +101,17 @@ def generate_candidates(
     if chord > _SAME_PLACE:
         paths = _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius)
     if not paths:
-        paths = _build_arcs(start, goal, count, waypoint_spacing, min_radius)
+        paths = dubins_paths(start, goal, min_radius, waypoint_spacing, count)
+        longest = _LONG_WAY_ROUND * path_length(paths[0])
+        paths = [path for path in paths if path_length(path) <= longest]
     if swing_radius is not None:
         turned, length = turn_and_drive(start, goal, swing_radius, waypoint_spacing)
         if length < min(path_length(path) for path in paths) - _SAME_PLACE:
             paths = [*paths[: count - 1], turned]
-    return [_pin_ends(path, start, goal) for path in paths]
-
-
-def lateral_offsets(count: int, spacing: float) -> list[float]:
-    """Return the lateral offsets of a fan [m]: 0, then left and right alternately, outwards."""
-    return [spacing * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(count)]
+    for path in paths:
+        path[0], path[-1] = start, goal  # without rounding errors
+        path[:, 2] = wrap(path[:, 2])
+    return paths
 
 
 def path_length(poses: np.ndarray) -> float:
@@ -130,13 +130,14 @@ def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> lis
     for scale in _TANGENT_SCALES:
         tangents = scale * length * np.column_stack([np.cos(yaws), np.sin(yaws)])
         paths = []
-        for offset in lateral_offsets(count, spacing):
+        for k in range(count):  # to the left and to the right alternately
+            offset = spacing * ((k + 1) // 2) * (1 if k % 2 else -1)
             places = _SHARES @ np.vstack([chord, tangents, offset * left])
             path = _sample(places, yaws, waypoint_spacing, min_radius)
             if path is not None:
                 path[:, :2] += start[:2]
                 paths.append(path)
-            elif offset == 0.0:
+            elif k == 0:
                 break
         if paths:
             return paths
@@ -169,20 +170,6 @@ def _sample(
     marks = np.linspace(0.0, driven[-1], 1 + count_steps(driven[-1], waypoint_spacing))
     x, y = (np.interp(marks, driven, values) for values in places.T)
     return np.column_stack([x, y, np.interp(marks, middles, yaw)])
-
-
-def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
-    """Sample the Dubins paths that are not much longer than the shortest one."""
-    paths = dubins_paths(start, goal, min_radius, waypoint_spacing, count)
-    longest = _LONG_WAY_ROUND * path_length(paths[0])
-    return [path for path in paths if path_length(path) <= longest]
-
-
-def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Replace the ends of a path by the exact start and goal, which removes rounding errors."""
-    path[0], path[-1] = start, goal
-    path[:, 2] = wrap(path[:, 2])
-    return path
 
 
 def check_pose(name: str, pose) -> np.ndarray:
