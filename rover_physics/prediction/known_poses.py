@@ -73,7 +73,7 @@ class KnownPoses:
         What is not known, `others` of the same model may know.
         """
         self._others = others
-        self.stretches: KnownStretches = KnownStretches() if others is None else others.stretches
+        self.stretches = KnownStretches() if others is None else others.stretches
         """What is known between waypoints."""
         self._rows: dict[bytes, int] = {}
         self._keys: list[bytes] = [b""] * most
