@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times single poses on one core, and a map of a million cells."""
+"""Times single poses on one core."""
 
-import statistics
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -9,7 +8,7 @@ from functools import partial
 import numba
 import numpy as np
 
-from benchmarks.grounds import all_grounds, made_reef, made_square, poses_anywhere, real_maps
+from benchmarks.grounds import all_grounds, made_reef, poses_anywhere, real_maps
 from benchmarks.measure import REPEATS, Figure, median_times
 from rover_physics import (
     PoseStatus,
@@ -18,7 +17,6 @@ from rover_physics import (
     Terrain,
     load_rover,
     score_poses,
-    sweep_map,
 )
 from rover_physics.names import OPTIMAL
 from rover_physics.numerics.kernels import kernel
@@ -29,19 +27,12 @@ POSES = 1_500
 """Poses on known ground that are timed."""
 LOOK_UPS, LOOKED_UP = 306, 100
 """Bare look-ups of the ground that a pose is compared with, and poses at which they are timed."""
-MAP_CELLS = 1_000
-"""Cells along each side of the map."""
-MAP_ROWS = (100, 180)
-"""First and last row of the part that is timed; the map is uniform except at its edges."""
 
 
 def measure() -> list[Figure]:
-    """Measure poses and the map."""
-    threads, rover = numba.config.NUMBA_NUM_THREADS, load_rover("lsr1")
+    """Measure poses on all grounds."""
     numba.set_num_threads(1)
-    figures = [*measure_poses(rover)]
-    numba.set_num_threads(threads)
-    return [*figures, measure_map(rover)]
+    return [*measure_poses(load_rover("lsr1"))]
 
 
 def measure_poses(rover: Rover) -> Iterator[Figure]:
@@ -95,17 +86,3 @@ def _time(rover: Rover, terrain: Terrain, pose: np.ndarray) -> float:
     began = time.thread_time_ns()
     score_poses(rover, terrain, pose)
     return 1e-3 * (time.thread_time_ns() - began)
-
-
-def measure_map(rover: Rover) -> Figure:
-    """Sweep a map at 8 headings, row by row, until there is enough."""
-    ground, rates, began = made_square(2, MAP_CELLS), [], time.perf_counter()
-    for first, scores in sweep_map(rover, ground):
-        taken = time.perf_counter() - began
-        if MAP_ROWS[0] <= first < MAP_ROWS[1]:
-            rates.append(scores.status.size / taken)
-        if first >= MAP_ROWS[1]:
-            break
-        began = time.perf_counter()
-    name = f"{MAP_CELLS:,} x {MAP_CELLS:,} cells: poses per second, all threads"
-    return Figure("map", name, statistics.median(rates), "1/s", repeats=len(rates))

@@ -17,12 +17,13 @@ import numpy as np
 import scipy  # loads `stats` where it is used: that takes a second
 import typer
 
+from benchmarks.grounds import Obstacle
 from benchmarks.measure import print_table
-from rover_physics import Rover, SweepOptions, Terrain, judge_paths, load_rover
+from rover_physics import Rover, SweepOptions, judge_paths, load_rover
 from rover_physics.rover.uncertainty import Uncertainty
 from support.paths import arc_of, poses_at
 from support.reference_cases import DATA
-from support.reference_drives import drive_ground, unlimited
+from support.reference_drives import unlimited
 
 CHANCES = DATA / "chances.jsonl"
 """Drives at 0.1 m/s."""
@@ -66,28 +67,13 @@ SURE = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChancePath:
-    """A path over a ground of the reference drives, or over rocks or relief."""
+class ChancePath(Obstacle):
+    """A path over a ground of the reference drives, with what the planner is told."""
 
-    kind: str
-    """Kind of the ground."""
-    size: float
-    """Height, width or RMS height [m], or angle [deg]."""
-    seed: int
-    """Seed of rocks and relief."""
     curvature: float
     """Curvature [1/m], left positive; 0 is straight ahead."""
-    friction: float
-    """Friction coefficient that the planner is told."""
-    max_torque: float
-    """Torque limit that the planner is told [N m]."""
     speed: float = FAST
     """Nominal speed of the drives [m/s]."""
-
-    @property
-    def ground(self) -> Terrain:
-        """The ground."""
-        return drive_ground(self.kind, self.size, self.seed)
 
     @property
     def poses(self) -> np.ndarray:

@@ -12,9 +12,10 @@ import numpy as np
 import typer
 
 from benchmarks.chance import MODEL_STDS
-from benchmarks.drives import BY_MAP, Obstacle, drive, run_in_processes
+from benchmarks.drives import BY_MAP, drive, run_in_processes
+from benchmarks.grounds import Obstacle
 from benchmarks.measure import print_table
-from rover_physics import Rover, SweepOptions, judge_path, load_rover
+from rover_physics import Rover, judge_path, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from support.reference_drives import drive_path, unlimited
@@ -71,9 +72,7 @@ def find_promises(obstacle: Obstacle) -> tuple[bool, ...]:
     """
     rover, ground, path = unlimited(load_rover("lsr1")), obstacle.ground, drive_path()
     known = replace(rover, uncertainty=replace(rover.uncertainty, **KNOWN))
-    asked = SweepOptions(
-        friction=obstacle.friction, max_torque=obstacle.max_torque, policy=OPTIMAL
-    )
+    asked = obstacle.options(OPTIMAL)
 
     def passes(one: Rover, accepted: float | None = None, **changes: Any) -> bool:
         options = replace(asked, **changes)
@@ -89,11 +88,9 @@ def find_chance(obstacle: Obstacle, model_std: float) -> float:
     """Return the chance that traction control fails, friction and torque limit known."""
     rover = unlimited(load_rover("lsr1"))
     known = replace(rover.uncertainty, **KNOWN, model=model_std)
-    asked = SweepOptions(
-        friction=obstacle.friction, max_torque=obstacle.max_torque, policy=OPTIMAL
-    )
-    path, rover = drive_path(), replace(rover, uncertainty=known)
-    return judge_path(rover, obstacle.ground, path, asked, accepted_chance=1.0)[1].failure_chance
+    asked = replace(rover, uncertainty=known), obstacle.ground, drive_path()
+    verdict = judge_path(*asked, obstacle.options(OPTIMAL), accepted_chance=1.0)[1]
+    return verdict.failure_chance
 
 
 def draw_passable(count: int, seed: int) -> dict[Obstacle, tuple[bool, ...]]:

@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 from rich.progress import track
 
+from benchmarks.grounds import Obstacle
 from benchmarks.measure import console
-from rover_physics import Rover, Terrain, load_rover
+from rover_physics import Rover, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.simulator.mujoco_rover import MAX_TILT, TIMESTEP, MujocoRover
-from rover_planner.simulator.path_follower import PathFollower
-from rover_planner.simulator.second_try import SecondTry
+from rover_planner.simulator.path_follower import PathFollower, SecondTry
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
-from support.reference_drives import drive_ground
 
 PERIOD = 0.02
 """Period of the controllers [s]."""
@@ -37,42 +36,6 @@ SERVO, DROOP, EQUAL_TORQUES = "servo", "servo with droop", "equal"
 BY_MOTION, BY_MAP = "optimal", "optimal, map"
 """Controllers: speed servos with an integral part or with droop, equal torques, and the QP with
 contact angles from motion or from the map."""
-
-
-@dataclass(frozen=True)
-class Obstacle:
-    """A ground to drive over along +x."""
-
-    kind: str
-    """step, bump_one_side, ditch, slope, cross_slope, rocks or relief."""
-    size: float
-    """Height or width [m], angle [deg], largest height of rocks or RMS height of relief [m]."""
-    friction: float
-    """Friction coefficient."""
-    seed: int = 0
-    """Seed of rocks and relief."""
-    max_torque: float | None = None
-    """Largest torque of a wheel [N m]; None: that of the rover."""
-
-    @property
-    def label(self) -> str:
-        """Kind, size, seed, friction and torque."""
-        seed = f", seed {self.seed}" if self.seed else ""
-        torque = "" if self.max_torque is None else f", {self.max_torque:.2f} N m"
-        return f"{self.kind} {self.size:.3g}{seed}, mu {self.friction:.2g}{torque}"
-
-    @property
-    def ground(self) -> Terrain:
-        """The ground."""
-        return drive_ground(self.kind, self.size, self.seed)
-
-    @property
-    def rover(self) -> Rover:
-        """The rover lsr1 at SPEED, with the torque limit."""
-        rover = replace(load_rover("lsr1"), nominal_speed=SPEED)
-        if self.max_torque is None:
-            return rover
-        return replace(rover, wheel=replace(rover.wheel, max_torque=self.max_torque))
 
 
 @dataclass(frozen=True)
@@ -106,6 +69,14 @@ OBSTACLES = tuple(
     for size, friction, seed in ((*row, 0)[:3] for row in rows)
 )
 """Obstacles of the benchmarks: frictions from 0.4 to 1.0."""
+
+
+def rover_of(obstacle: Obstacle) -> Rover:
+    """Return the rover lsr1 at SPEED, with the torque limit of an obstacle."""
+    rover = replace(load_rover("lsr1"), nominal_speed=SPEED)
+    if obstacle.max_torque is None:
+        return rover
+    return replace(rover, wheel=replace(rover.wheel, max_torque=obstacle.max_torque))
 
 
 def make_controller(
@@ -174,7 +145,7 @@ def drive(
     timestep: float = TIMESTEP,
 ) -> DriveResult:
     """Drive the rover lsr1 over an obstacle, as `follow_axis`, with a time step of MuJoCo [s]."""
-    rover = obstacle.rover
+    rover = rover_of(obstacle)
     plant = MujocoRover(rover, obstacle.ground, (START, 0.0, 0.0), obstacle.friction, timestep)
     slip = torque = energy = 0.0
     peaks: list[float] = []

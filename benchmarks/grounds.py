@@ -1,16 +1,50 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Grounds and poses that benchmarks run on."""
+"""Grounds, obstacles and poses that benchmarks run on."""
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rover_physics import Terrain, load_terrain
+from rover_physics import SweepOptions, Terrain, load_terrain
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import reference_ground
+from support.reference_drives import drive_ground
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A ground to drive over along +x."""
+
+    kind: str
+    """step, bump_one_side, ditch, slope, cross_slope, rocks or relief."""
+    size: float
+    """Height or width [m], angle [deg], largest height of rocks or RMS height of relief [m]."""
+    friction: float
+    """Friction coefficient."""
+    seed: int = 0
+    """Seed of rocks and relief."""
+    max_torque: float | None = None
+    """Largest torque of a wheel [N m]; None: that of the rover."""
+
+    @property
+    def label(self) -> str:
+        """Kind, size, seed, friction and torque."""
+        seed = f", seed {self.seed}" if self.seed else ""
+        torque = "" if self.max_torque is None else f", {self.max_torque:.2f} N m"
+        return f"{self.kind} {self.size:.3g}{seed}, mu {self.friction:.2g}{torque}"
+
+    @property
+    def ground(self) -> Terrain:
+        """The ground."""
+        return drive_ground(self.kind, self.size, self.seed)
+
+    def options(self, policy: str) -> SweepOptions:
+        """Return the options of a planner that knows friction and torque limit."""
+        return SweepOptions(friction=self.friction, max_torque=self.max_torque, policy=policy)
 
 
 def all_grounds() -> dict[str, Terrain]:

@@ -21,10 +21,11 @@ from benchmarks.drives import (
     SERVO,
     SPEED,
     START,
-    Obstacle,
     follow_axis,
+    rover_of,
     run_in_processes,
 )
+from benchmarks.grounds import Obstacle
 from benchmarks.measure import print_table
 from rover_physics import Rover, Terrain, load_rover
 from rover_physics.terrain.grid import save_terrain
@@ -150,7 +151,9 @@ def draw_drive(seed: int, number: int) -> LearningDrive:
 def record(drive: LearningDrive) -> Recorded:
     """Drive in MuJoCo."""
     obstacle, start = drive.obstacle, (START, 0.0, 0.0)
-    plant = MujocoRover(obstacle.rover, drive.ground, start, drive.frictions[0], drive.timestep)
+    plant = MujocoRover(
+        rover_of(obstacle), drive.ground, start, drive.frictions[0], drive.timestep
+    )
     rows = [measure(plant) for _ in follow_axis(plant, obstacle, drive.controller, most_time=1.5)]
     return Recorded(np.array(rows).reshape(-1, log.WIDTH), bool(plant.pose()[0] >= END))
 

@@ -134,11 +134,6 @@ class Client:
         """Call ~/check_path; return the future."""
         return self._check.call_async(Trigger.Request())
 
-    def begin_plan(self, start: Pose, goal: Pose, node: str = SERVER) -> Any:
-        """Call ~/can_traverse; return the future."""
-        ends = {"start": stamped_pose(start, "map"), "goal": stamped_pose(goal, "map")}
-        return self._plans[node].call_async(GetPlan.Request(**ends))
-
     def check(self, timeout: float = 60.0) -> dict[str, Any]:
         """Return the verdict on the last path; raise TimeoutError after a timeout [s]."""
         return json.loads(finish(self.begin_check(), timeout).message)
@@ -147,7 +142,8 @@ class Client:
         self, start: Pose, goal: Pose, timeout: float = START_TIME, node: str = SERVER
     ) -> PathMessage:
         """Return a plan; raise TimeoutError after a timeout [s]."""
-        return finish(self.begin_plan(start, goal, node), timeout).plan
+        ends = {"start": stamped_pose(start, "map"), "goal": stamped_pose(goal, "map")}
+        return finish(self._plans[node].call_async(GetPlan.Request(**ends)), timeout).plan
 
     def first_plan(self, start: Pose, goal: Pose, node: str = SERVER) -> PathMessage:
         """Wait for the service, then return a plan."""

@@ -20,10 +20,10 @@ from benchmarks.drives import (
     OBSTACLES,
     SERVO,
     DriveResult,
-    Obstacle,
     drive,
     run_in_processes,
 )
+from benchmarks.grounds import Obstacle
 from benchmarks.measure import OUTPUT, print_table, write_rows
 
 CONTROLLERS = (SERVO, EQUAL_TORQUES, BY_MOTION, BY_MAP)

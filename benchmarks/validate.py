@@ -17,12 +17,12 @@ import numpy as np
 import typer
 from scipy.optimize import linprog
 
+from benchmarks.grounds import Obstacle
 from benchmarks.measure import console, print_table
 from rover_physics import (
     PathPrediction,
     Rover,
     SweepOptions,
-    Terrain,
     Verdict,
     judge_path,
     judge_poses,
@@ -34,11 +34,11 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.traversability.verdict import hold_against_limits
 from support.paths import arc_of, poses_at
 from support.reference_cases import DATA, STEERED, reference_predictions
-from support.reference_drives import KEPT, drive_ground, drive_path, unlimited
+from support.reference_drives import KEPT, drive_path, unlimited
 
 PASSED = "passed"
 GROUNDS = {"ramp": "slope", "tilt": "cross_slope", "rocks": "caps"}
-"""Grounds of drives that curves have, by the name they have there."""
+"""Kinds of grounds, by the name that curves have for them."""
 DRIVES = {"drive": "", "mu": "", "limit [N m]": ".2f", "in MuJoCo": "", "ended at x [m]": ".2f"}
 CURVES = {"curve": "", "mu": "", "path in MuJoCo": ""}
 """Columns of tables beside the verdict."""
@@ -46,18 +46,10 @@ LENGTH, TURN = 2.4, np.pi
 """Length of an arc [m] and angle of a turn on the spot [rad]."""
 
 
-@dataclass(frozen=True)
-class ReferenceDrive:
+@dataclass(frozen=True, kw_only=True)
+class ReferenceDrive(Obstacle):
     """One drive of the rover lsr1 over an obstacle, from x = -1.2 to 1.2 along +x."""
 
-    kind: str
-    """step, ditch, bump_one_side, slope or cross_slope."""
-    size: float
-    """Height or width [m], or angle of a slope [deg]."""
-    friction: float
-    """Friction coefficient."""
-    max_torque: float
-    """Torque limit of the speed servos [N m]."""
     outcome: str
     """passed, stuck or tipped; tipped includes sliding off."""
     end: float
@@ -80,30 +72,25 @@ def judge_drives(policy: str) -> Iterator[tuple[ReferenceDrive, Verdict]]:
     rover = unlimited(load_rover("lsr1"))
     for row in json.loads((DATA / "drives.json").read_text())["rows"]:
         drive = ReferenceDrive(
-            row["kind"], row["size"], row["mu"], row["tau_max"], row["outcome"], row["x"]
+            kind=row["kind"],
+            size=row["size"],
+            friction=row["mu"],
+            max_torque=row["tau_max"],
+            outcome=row["outcome"],
+            end=row["x"],
         )
-        options = SweepOptions(friction=drive.friction, max_torque=drive.max_torque, policy=policy)
-        ground = drive_ground(drive.kind, drive.size)
-        prediction = judge_path(rover, ground, drive_path(), options)[0]
+        prediction = judge_path(rover, drive.ground, drive_path(), drive.options(policy))[0]
         yield drive, hold_against_limits(rover, prediction)
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Curve(Obstacle):
     """One drive of the rover lsr1 along an arc or a turn on the spot."""
 
-    kind: str
-    """flat, tilt, ramp, step or rocks."""
-    size: float
-    """Angle [deg], height [m] or seed."""
     mode: str
     """steered, spot, skid or skid_spot."""
     curvature: float
     """[1/m], infinite on the spot."""
-    friction: float
-    """Friction coefficient."""
-    max_torque: float
-    """Torque limit of the speed servos [N m]."""
     start: np.ndarray
     """(3,) x, y [m], yaw [rad]."""
     kept: bool
@@ -122,25 +109,10 @@ class Curve:
         return label, self.friction, "kept" if self.kept else "left"
 
     @property
-    def steered(self) -> bool:
-        """True if the end wheels steer."""
-        return self.mode in ("steered", "spot")
-
-    @property
-    def ground(self) -> Terrain:
-        """The ground."""
-        return drive_ground(GROUNDS.get(self.kind, self.kind), self.size)
-
-    @property
     def rover(self) -> Rover:
         """The rover, without limits that MuJoCo lacks."""
         rover = unlimited(load_rover("lsr1"))
-        return rover if self.steered else replace(rover, steering=None)
-
-    @property
-    def options(self) -> SweepOptions:
-        """The options under policy "servo"."""
-        return SweepOptions(policy="servo", friction=self.friction, max_torque=self.max_torque)
+        return replace(rover, steering=None) if "skid" in self.mode else rover
 
     @property
     def path(self) -> np.ndarray:
@@ -153,8 +125,8 @@ class Curve:
 
     def predict_trace(self) -> PathPrediction:
         """Return the prediction at the poses of the trace."""
-        curvatures = np.full(len(self.poses), self.curvature)
-        return judge_poses(self.rover, self.ground, self.poses, curvatures, self.options)[0]
+        curvatures, options = np.full(len(self.poses), self.curvature), self.options("servo")
+        return judge_poses(self.rover, self.ground, self.poses, curvatures, options)[0]
 
 
 @lru_cache
@@ -167,7 +139,7 @@ def _read(row: dict) -> Curve:
     trace = row["trace"]
     away = np.subtract(row["end"], row["nominal_end"])[:2]
     return Curve(
-        kind=row["kind"],
+        kind=GROUNDS.get(row["kind"], row["kind"]),
         size=row["size"],
         mode=row["mode"],
         curvature=float(row["kappa"]),
@@ -298,15 +270,14 @@ def print_energy() -> None:
 
     MuJoCo's time step is 2 ms: with the usual 4 ms its wheels chatter on their contacts.
     """
-    from benchmarks.drives import DROOP, OBSTACLES, drive, run_in_processes
+    from benchmarks.drives import DROOP, OBSTACLES, drive, rover_of, run_in_processes
 
     errors, rows = [], []
     jobs = [(obstacle, DROOP, 1, 2.0, 0.002) for obstacle in OBSTACLES]
     for obstacle, row in zip(OBSTACLES, run_in_processes(drive, jobs), strict=True):
         if row.passed:
-            options = SweepOptions(policy="servo", friction=obstacle.friction)
-            rover, ground = unlimited(obstacle.rover), obstacle.ground
-            ours = float(judge_path(rover, ground, drive_path(), options)[0].energy[-1])
+            asked = unlimited(rover_of(obstacle)), obstacle.ground, drive_path()
+            ours = float(judge_path(*asked, obstacle.options("servo"))[0].energy[-1])
             errors.append(abs(ours / row.energy - 1.0))
             rows.append((obstacle.label, row.energy, ours))
     rows.append(("median error", None, f"{np.median(errors):.0%}"))
@@ -325,7 +296,7 @@ def main(
         with console(stderr=True).status(f"drives, {policy}"):
             print_differences(f"Drives under {policy} torques", DRIVES, [*judge_drives(policy)])
     curves = [
-        (curve, judge_path(curve.rover, curve.ground, curve.path, curve.options)[1])
+        (curve, judge_path(curve.rover, curve.ground, curve.path, curve.options("servo"))[1])
         for curve in read_curves()
     ]
     print_differences("Curves under servo torques", CURVES, curves)

@@ -50,19 +50,6 @@ _NUMBERS = {datatype: np.dtype(name.lower()).str[1:] for datatype, name in _DATA
 _FLOATS = {datatype: kind for datatype, kind in _NUMBERS.items() if kind.startswith("f")}
 
 
-def is_same_cloud(cloud: PointCloud2, other: PointCloud2) -> bool:
-    """Return whether two clouds differ in their stamps at most."""
-
-    def describe(one: PointCloud2) -> tuple[Any, ...]:
-        size = one.height, one.width, one.point_step, one.row_step
-        return one.header.frame_id, size, one.fields, one.is_bigendian, one.is_dense
-
-    if describe(cloud) != describe(other):
-        return False
-    data, others = (np.frombuffer(one.data, np.uint8) for one in (cloud, other))
-    return np.array_equal(data, others)
-
-
 PointMove = tuple[NDArray[np.float64], NDArray[np.float64]]
 """R (3, 3) and t (3,) [m]: a point p of a sensor's frame is at R p + t in that of the map."""
 

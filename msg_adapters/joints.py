@@ -4,7 +4,6 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,6 @@ from rover_physics.rover.steering_joints import LEFT, RIGHT
 _PLURALS = {"position": "positions", "velocity": "velocities"}
 FORM = "model_joint:robot_joint, model_joint:robot_joint:-1 or model_joint:robot_joint:-1:0.05"
 """Form of an entry, for error texts."""
-KNOWN_MESSAGES = 16
-"""Most sets of names whose places are remembered."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +52,6 @@ class JointNames:
         for name in STEERING_JOINTS if steering == RIGHT else ():
             link = self.link(name)
             self._of_model[name] = replace(link, sign=-link.sign, offset=-link.offset)
-        # A publisher names the same joints in each message.
-        self._places = lru_cache(maxsize=KNOWN_MESSAGES)(self._find_places)
 
     def link(self, model: str) -> JointLink:
         """Return the link of a joint of the model."""
@@ -113,25 +108,18 @@ class JointNames:
                 )
         return found
 
-    def places(
-        self, names: Collection[str], wanted: Collection[str]
-    ) -> tuple[tuple[int, JointLink], ...]:
+    def places(self, names: Sequence[str], wanted: Collection[str]) -> list[tuple[int, JointLink]]:
         """Return where wanted joints of the model are among the names of a message.
 
         Raises:
             MessageError: One of them occurs twice.
         """
-        return self._places(tuple(names), tuple(wanted))
-
-    def _find_places(
-        self, names: tuple[str, ...], wanted: tuple[str, ...]
-    ) -> tuple[tuple[int, JointLink], ...]:
-        """Return where the wanted joints are among the names of a message, with their links."""
+        places = {name: place for place, name in enumerate(names)}
         links = [self.link(name) for name in wanted]
-        for link in links:
+        for link in links if len(places) < len(names) else ():
             if names.count(link.robot) > 1:
                 raise MessageError(f"joint_states names {link.robot} twice")
-        return tuple((names.index(one.robot), one) for one in links if one.robot in names)
+        return [(places[link.robot], link) for link in links if link.robot in places]
 
     def signs(self, names: Collection[str]) -> NDArray[np.float64]:
         """Return the signs of joints of the model, which rates and efforts have too."""

@@ -10,9 +10,9 @@ from nav_msgs.msg import Path
 from numpy.typing import ArrayLike, NDArray
 from std_msgs.msg import Header
 
-from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame, check_norm, describe_quaternion
+from msg_adapters.raw_messages import Fields
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quaternions import (
     forward_from_xyzw,

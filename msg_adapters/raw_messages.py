@@ -8,14 +8,14 @@ read, under the same names, and the data of a cloud are a view of its bytes.
 
 import struct
 from collections import namedtuple
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, JointState, PointCloud2
+from sensor_msgs.msg import Imu, PointCloud2
 
-from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
 
 MAX_FIELDS = 1000
@@ -36,47 +36,41 @@ _Vector = namedtuple("_Vector", "x y z")
 _Quaternion = namedtuple("_Quaternion", "x y z w")
 
 
-class SensorReader:
-    """Reads messages of sensors.
+class Fields:
+    """Reads the fields of a serialised message (CDR) one after the other.
 
-    Frame and names of joints are read once: those of a publisher are the same in each message.
+    Where the message ends early, struct.error is raised.
     """
 
-    def __init__(self) -> None:
-        self._readers = {
-            Imu: _read_imu, JointState: self._read_joints, Odometry: _read_odometry,
-            Twist: _read_twist, TwistStamped: _read_twist_stamped, PointCloud2: _read_cloud,
-        }  # fmt: skip
-        self._head, self._frame = b"", ""
-        self._names: tuple[str, ...] = ()
+    def __init__(self, message: bytes):
+        """Begin behind the first four bytes, which tell the order of the others."""
+        self._message, self._order = message, "<" if message[1:2] == b"\1" else ">"
+        self.at = 4
+        """Where the next field begins, before its alignment."""
 
-    def reads(self, kind: type) -> bool:
-        """Return whether it reads messages of a type."""
-        return kind in self._readers
+    def numbers(self, form: str) -> tuple[Any, ...]:
+        """Return numbers of one size in a format of struct, such as "iI" or "4d"."""
+        form = self._order + form
+        self.at += (4 - self.at) % struct.calcsize(self._order + form[-1])
+        found = struct.unpack_from(form, self._message, self.at)
+        self.at += struct.calcsize(form)
+        return found
 
-    def read(self, message: bytes, kind: type) -> Any:
-        """Return what adapters read of a message of a type that it `reads`.
+    def count(self) -> int:
+        """Return the number of elements of a sequence."""
+        return int(self.numbers("I")[0])
 
-        Raises:
-            MessageError: The bytes are no such message.
-        """
-        try:
-            return self._readers[kind](Fields(message))
-        except struct.error as error:
-            raise DamagedMessageError(message, kind, error) from None
+    def text(self) -> str:
+        """Return a text."""
+        length = self.count()
+        begin, self.at = self.at, self.at + length
+        return self._message[begin : self.at - 1].decode(errors="replace")
 
-    def _read_joints(self, fields: Fields) -> SimpleNamespace:
-        stamp = _read_stamp(fields)
-        if not fields.skip(self._head):
-            begin = fields.at
-            self._frame = fields.text()
-            self._names = tuple(fields.text() for _ in range(fields.count()))
-            self._head = fields.since(begin)
-        position, velocity, effort = (fields.doubles() for _ in range(3))
-        return SimpleNamespace(
-            header=SimpleNamespace(stamp=stamp, frame_id=self._frame), name=self._names,
-            position=position, velocity=velocity, effort=effort,
-        )  # fmt: skip
+    def view(self) -> memoryview:
+        """Return a view of a sequence of bytes."""
+        length = self.count()
+        begin, self.at = self.at, self.at + length
+        return memoryview(self._message)[begin : self.at]
 
 
 def _read_stamp(fields: Fields) -> SimpleNamespace:
@@ -129,3 +123,22 @@ def _read_cloud(fields: Fields) -> SimpleNamespace:
 def _read_point_field(fields: Fields) -> SimpleNamespace:
     name, (offset,), (datatype,) = fields.text(), fields.numbers("I"), fields.numbers("B")
     return SimpleNamespace(name=name, offset=offset, datatype=datatype, count=fields.count())
+
+
+READERS: dict[type, Callable[[Fields], SimpleNamespace]] = {
+    Imu: _read_imu, Odometry: _read_odometry, PointCloud2: _read_cloud,
+    Twist: _read_twist, TwistStamped: _read_twist_stamped,
+}  # fmt: skip
+"""What reads the messages of each type of this file."""
+
+
+def read_raw(message: bytes, kind: type) -> Any:
+    """Return what adapters read of a message of a type of READERS.
+
+    Raises:
+        MessageError: The bytes are no such message.
+    """
+    try:
+        return READERS[kind](Fields(message))
+    except struct.error as error:
+        raise DamagedMessageError(message, kind, error) from None

@@ -52,10 +52,10 @@ class TorquePolicy(IntEnum):
 
 
 class Stall(IntEnum):
-    """Why a rover stands, with torque policies that a wheel is wedged; SLIDING where it drives."""
+    """What else than sliding wheels stops a rover; under torque policies only a wedged wheel."""
 
-    SLIDING = 0
-    """The wheels slide."""
+    NONE = 0
+    """Nothing: the rover drives, or its wheels slide."""
     STALLED = 1
     """The motors stall at their largest torque."""
     WEDGED = 2

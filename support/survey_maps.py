@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small maps and surveys for tests of surveys."""
 
+import errno
 import itertools
 import os
 import signal
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rover_physics import SweepOptions, Terrain, save_terrain
-from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, survey_chunk
+from rover_planner.survey.chunk_survey import SurveyJob, survey_chunk
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import SurveyStore
@@ -77,15 +78,20 @@ def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -
 _attempts = itertools.count(1)
 
 
-def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
+def fail_on_one(job: SurveyJob, chunk: Index) -> int:
     """Survey a chunk as a task does, but fail on one; here, as workers import it."""
     if chunk == (0, 1):
         raise RuntimeError(f"this chunk is cursed after {next(_attempts)} attempts")
     return survey_chunk(job, chunk)
 
 
-def die_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
+def die_on_one(job: SurveyJob, chunk: Index) -> int:
     """Survey a chunk as a task does, but die of one."""
     if chunk == (0, 1):
         os.kill(os.getpid(), signal.SIGKILL)
     return survey_chunk(job, chunk)
+
+
+def fill_the_disk(job: SurveyJob, chunk: Index) -> int:
+    """Find no room for a chunk."""
+    raise OSError(errno.ENOSPC, "No room")

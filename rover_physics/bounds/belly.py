@@ -6,6 +6,7 @@ import numpy as np
 from rover_physics.contact.clearance import POINTS, point_of_underside
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import cross, dot
+from rover_physics.rover.linkage import pitch_axis
 from rover_physics.terrain.ground import elevation_of, height_at_cell, look_up, to_cells
 
 
@@ -97,11 +98,9 @@ def _plane_change(R, spread, dx, dy, z):
     A rotation by d about an axis a moves the plane's point p by (a x p) d. The rise of the plane
     above a fixed place is the component of this along the plane's normal, over the normal's z.
     """
-    length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
     place, normal = (dx, dy, z), (R[0, 2] / R[2, 2], R[1, 2] / R[2, 2], 1.0)
-    # Roll rotates about the body's x axis, pitch about the horizontal axis across the heading.
     by_roll = dot(normal, cross((R[0, 0], R[1, 0], R[2, 0]), place))
-    by_pitch = dot(normal, cross((-R[1, 0] / length, R[0, 0] / length, 0.0), place))
+    by_pitch = dot(normal, cross(pitch_axis(R), place))
     lowered, raised = 0.0, 0.0
     for wheel in range(6):
         rate = spread.response[0, wheel]

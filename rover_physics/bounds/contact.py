@@ -10,9 +10,9 @@ on a slope.
 
 import numpy as np
 
-from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import MAX_ANGLES, MAX_CIRCLES
 from rover_physics.contact.rim_scan import find_gap
+from rover_physics.contact.tracking import search_circle
 from rover_physics.contact.wheel import COMPLIANCE
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type

@@ -184,25 +184,27 @@ def find_bounds(
     given = check_poses(poses), np.ascontiguousarray(results["motion"]), results
     with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
-            places = tuple(view_read_only(one[part]) for one in given)
-            run_chunks(bound_poses, (uncertain, places, works, bounds[part]), len(works), threads)
+            places = (view_read_only(one[part]) for one in given)
+            run_chunks(bound_poses, (uncertain, *places, works, bounds[part]), len(works), threads)
     return bounds
 
 
 @kernel
-def bound_poses(uncertains, places, works, bounds, part):
+def bound_poses(uncertains, poses, motions, results, works, bounds, first_chunk, end_chunk):
     """Bound the poses of some chunks, one chunk per work space.
 
     Args:
         uncertains: (1,) UNCERTAIN.
-        places: (n, 3) poses, (n, 3) their motions, and (n,) RESULTs on the nominal ground.
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin.
+        motions: (n, 3) their motions.
+        results: (n,) RESULTs on the nominal ground.
         works: (chunks,) BOUNDS_WORK.
         bounds: (n,) WAYPOINT_BOUNDS, written.
-        part: The first chunk and the one after the last.
+        first_chunk: The first chunk.
+        end_chunk: The one after the last.
     """
-    (poses, motions, results), chunks = places, works.size
-    n = poses.shape[0]
-    for chunk in range(part[0], part[1]):
+    n, chunks = poses.shape[0], works.size
+    for chunk in range(first_chunk, end_chunk):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(uncertains[0].nominal, poses, motions, i, works[chunk].rover)
             bounds[i].status = bound_pose(uncertains[0], results[i], works[chunk], bounds[i])

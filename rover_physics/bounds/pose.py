@@ -19,12 +19,13 @@ from rover_physics.contact.settling import (
     find_step,
     limit_step,
     write_gap_rates,
+    write_rates,
 )
 from rover_physics.contact.wheel import find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.numerics.records import record_type
-from rover_physics.rover.linkage import place, rocker_sign
+from rover_physics.rover.linkage import pitch_axis, place
 from rover_physics.status import BoundStatus, PoseStatus
 
 NOMINAL_GAP = 1e-2
@@ -204,19 +205,9 @@ def _find_moves(linkage, work, wheel):
     The largest motion includes the rise or fall of all wheels on the uncertain ground.
     """
     placement, spread = work.rover.placement, work.spread
-    rate = spread.rate
-    R, origin, centre = placement.R, placement.origin, placement.centres[wheel]
-    forward = placement.ahead
-    length, side = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0]), wheel // 3
-    rate[:] = 0.0
-    rate[1] = _shift((R[0, 0], R[1, 0], R[2, 0]), centre, origin, forward)
-    rate[2] = _shift((-R[1, 0] / length, R[0, 0] / length, 0.0), centre, origin, forward)
-    axis = R[0, 1], R[1, 1], R[2, 1]
-    pivot = placement.rocker_pivots[side]
-    rate[3] = rocker_sign(side) * _shift(axis, centre, pivot, forward)
-    if linkage.on_bogie[wheel]:
-        pivot = placement.bogie_pivots[side]
-        rate[4 + side] = _shift(axis, centre, pivot, forward)
+    rate, ahead = spread.rate, placement.ahead
+    forward, about = (ahead[0], ahead[1], ahead[2]), pitch_axis(placement.R)
+    write_rates(linkage, placement, wheel, placement.centres[wheel], forward, about, rate)
     own, largest = 0.0, 0.0
     for other in range(6):
         change = 0.0
@@ -226,14 +217,6 @@ def _find_moves(linkage, work, wheel):
                 own += rate[i] * spread.lift[i, other]
         largest += abs(change) * max(spread.high[other], -spread.low[other])
     return own, largest
-
-
-@kernel
-def _shift(axis, point, pivot, forward):
-    """Return the forward motion of a point per rotation about an axis through `pivot` [m/rad]."""
-    ax, ay, az = axis
-    x, y, z = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
-    return forward[0] * (ay * z - az * y) + forward[1] * (az * x - ax * z)
 
 
 @kernel

@@ -6,7 +6,8 @@ place a little aside has other contacts, those that use less than UNEVEN_FAR. So
 none around uses more than NEAR with the least friction and torque of all samples, and all else off
 to either side. The others are evaluated anew in each sample, with the contacts that they have at
 its place: samples that share a place settle once. Drops and poses between waypoints are those of
-the prediction. On even ground a share of the model's error counts.
+the prediction. On even ground a share of the model's error counts. Where a sample would leave
+the known ground, the pose stays at its place: what nobody knows is no failure.
 """
 
 from dataclasses import dataclass, replace
@@ -55,6 +56,8 @@ OF_PATH = ("falling", "wheel_drop", "drift", "lift_height")
 """Quantities that the path around a pose decides."""
 OF_SLOTS = ("speed_share", "stalls")
 """Quantities that it decides if wheels are not on speed servos: whether one is wedged."""
+OFF_KNOWN_GROUND = (PoseStatus.OFF_MAP, PoseStatus.UNKNOWN_GROUND)
+"""States that a pose which is settled as told has only in samples that are beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,8 @@ class FailureChance:
     at: Floats
     """(n,) that it fails at a waypoint or on the way there from the one before."""
     limit: str
-    """Title of the limit that breaks most often where it fails most often; empty for none."""
+    """Title of the limit that breaks most often where it fails most often; empty where none does,
+    or the rover most often does not settle."""
     is_whole: bool = True
     """False if not all samples were asked: the chances may be larger."""
 
@@ -105,12 +109,13 @@ def find_failure_chance(
     if model.options.policy == OPTIMAL:
         groups = tuple(one.weaken() for one in groups)
     around = AROUND * model.rover.uncertainty.position if on_path else 0.0
-    on_path &= model.wheels.on_servos
+    on_path &= model.on_servos
     asked, on_path = _find_asked(model, swept, rows, groups, on_path, around)
     settled = rows.results["status"] == PoseStatus.SETTLED
     failed = np.zeros((SAMPLES if len(asked) else 1, n), bool)
     failed[:, rows.waypoint[~settled]] = True
-    counts, done = np.zeros((n, len(model.limits)), np.int64), 0
+    causes = [*(row.title for row in model.limits.rows), ""]
+    counts, done = np.zeros((n, len(causes)), np.int64), 0
     part = None if model.terrain.elevation_std is None else _cut_around(model, rows.poses)
     looked_at = np.flatnonzero(settled) if on_path else asked
     for group in groups if len(asked) else ():
@@ -122,7 +127,7 @@ def find_failure_chance(
                 every = _place(rows, asked, results)
                 _write_path(drawn, swept, every)
                 results = select_results(every, looked_at)
-            broken = find_uses(model.limits, results).use > 1.0
+            broken = _find_causes(model, results)
             fails = broken.any(axis=1)
             waypoints = rows.waypoint[looked_at[fails]]
             failed[done, waypoints] = True
@@ -131,10 +136,16 @@ def find_failure_chance(
         if failed.any(axis=1).sum() > enough * SAMPLES:
             break
     at = failed.mean(axis=0)
-    place = int(at.argmax())
-    most = int(counts[place].argmax())
-    limit = model.limits.rows[most].title if counts[place, most] else ""
-    return FailureChance(float(failed.any(axis=1).mean()), at, limit, done in (0, SAMPLES))
+    of_worst = counts[at.argmax()]
+    cause = causes[of_worst.argmax()] if of_worst.any() else ""
+    return FailureChance(float(failed.any(axis=1).mean()), at, cause, done in (0, SAMPLES))
+
+
+def _find_causes(model: PackedModel, results: np.ndarray) -> NDArray[np.bool_]:
+    """Return which limits RESULTs (n,) break, and in a last column whether they do not settle."""
+    lost = (results["status"] != PoseStatus.SETTLED)[:, None]
+    broken = find_uses(model.limits, results).use > 1.0
+    return np.hstack([broken & ~lost, lost])
 
 
 def _find_asked(
@@ -244,7 +255,7 @@ def _evaluate(
     Poses between waypoints stay where they are: a peak of millimetres, as where a wheel leaves an
     edge, is met wherever the path is, and not a few millimetres beside it.
     """
-    rows = rows.select(asked)
+    every, rows = rows, rows.select(asked)
     poses = np.where((asked < waypoints)[:, None], group.move(rows.poses), rows.poses)
     motions = np.ascontiguousarray(rows.results["motion"])
     results = unwritten_results(len(group.samples) * len(poses)).reshape(-1, len(poses))
@@ -258,11 +269,15 @@ def _evaluate(
             found = model.evaluate_variants(variants, poses[here], motions[here], rows.held[here])
             for to, one in zip(results, found.T, strict=True):
                 place_results(np.ascontiguousarray(one), to, here)
-    for name in OF_PATH if model.wheels.on_servos else (*OF_PATH, *OF_SLOTS):
+    for name in OF_PATH if model.on_servos else (*OF_PATH, *OF_SLOTS):
         results[name] = rows.results[name]
     results["torque_saturation"] /= np.array([[one.torques] for one in group.samples])
-    if model.wheels.on_servos:
+    if model.on_servos:
         results["torque_share"] = results["torque_saturation"].mean(axis=2)
+    lost = np.isin(results["status"], OFF_KNOWN_GROUND).any(axis=0)
+    if lost.any() and group.shift.any():
+        stays = replace(group, shift=np.zeros(3))
+        results[:, lost] = _evaluate(model, every, asked[lost], waypoints, stays)
     return results
 
 

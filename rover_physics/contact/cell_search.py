@@ -5,17 +5,25 @@ The wheel is nowhere below a parabola along its heading, and a cell bends above 
 more than an eighth of that. So a cell whose highest corner is too low is left out unseen, and a
 cell or edge is searched from its nearest corner only: where the ground is straight, along an edge,
 the largest intrusion has a closed form; within a cell it can be larger if the ground is twisted,
-or where a rim cuts the cell. `intrusion.py` explains the terms; lengths are in cells.
+or where a rim cuts the cell. `cell_peaks.py` explains the terms; lengths are in cells.
 """
 
 import numpy as np
 from numba import int64
 
-from rover_physics.contact.cell_peaks import LEVEL, away_from_zero, look_along_rim, look_into_cell
-from rover_physics.contact.circle_search import search_circle
+from rover_physics.contact.cell_peaks import (
+    LEVEL,
+    ROUNDING,
+    away_from_zero,
+    begin_search,
+    is_below,
+    is_beside,
+    look_along_rim,
+    look_into_cell,
+    take_point,
+)
 from rover_physics.contact.contact_record import NOTICED
-from rover_physics.contact.intrusion import ROUNDING, begin_search, is_below, is_beside, take_point
-from rover_physics.contact.tracking import keep_contact, take_circle
+from rover_physics.contact.tracking import keep_contact, search_circle, take_circle
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.ground import elevation_of

@@ -34,8 +34,8 @@ def belly_clearance(ground, linkage, placement):
 
     The heights are those of all cell centres within the outline of the underside. If none of them
     is known, as with large cells, nine points of the underside are used; NaN if their ground is
-    unknown, too, or if the body is upside down. The block of cells that may be nearest is searched
-    first. Blocks whose highest ground is farther below than the result so far are skipped.
+    unknown, too, or if the body is upside down. Blocks whose highest ground is farther below than
+    the result so far are skipped.
 
     Args:
         ground: GROUND.
@@ -48,21 +48,12 @@ def belly_clearance(ground, linkage, placement):
         return np.nan
     plane = _describe_underside(ground, R, origin, belly)
     low_i, high_i, low_j, high_j = _blocks_below(ground, R, origin, belly)
-    nearest, nearest_i, nearest_j = np.inf, low_i, low_j
+    smallest = np.inf
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
             bound = _lowest_above(plane, bi, bj) - known_max_of_block(ground, bi, bj)
-            if bound < nearest and _is_below(plane, belly, bi, bj):
-                nearest, nearest_i, nearest_j = bound, bi, bj
-    smallest = np.inf
-    if nearest < np.inf:
-        smallest = _clear_block(ground, plane, belly, (nearest_i, nearest_j), np.inf)
-    for bi in range(low_i, high_i + 1):
-        for bj in range(low_j, high_j + 1):
-            if _lowest_above(plane, bi, bj) - known_max_of_block(
-                ground, bi, bj
-            ) < smallest and _is_below(plane, belly, bi, bj):
-                smallest = _clear_block(ground, plane, belly, (bi, bj), smallest)
+            if bound < smallest and _is_below(plane, belly, bi, bj):
+                smallest = _clear_block(ground, plane, belly, bi, bj, smallest)
     return smallest if smallest < np.inf else _clear_points(ground, R, origin, belly)
 
 
@@ -139,9 +130,8 @@ def _is_below(plane, belly, bi, bj):
 
 
 @kernel
-def _clear_block(ground, plane, belly, block, smallest):
-    """Return the smaller of `smallest` and the clearance above a block (row, column) [m]."""
-    bi, bj = block
+def _clear_block(ground, plane, belly, bi, bj, smallest):
+    """Return the smaller of `smallest` and the clearance above a block of cells [m]."""
     for i in range(BLOCK * bi, min(BLOCK * (bi + 1), ground.rows)):
         for j in range(BLOCK * bj, min(BLOCK * (bj + 1), ground.columns)):
             clearance = _at(plane.z, i, j) - elevation_of(ground, i, j)

@@ -18,8 +18,8 @@ import numpy as np
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_algebra import difference, solve_in_place
-from rover_physics.rover.linkage import place, rocker_sign
+from rover_physics.numerics.linear_algebra import cross, difference, dot, solve_in_place
+from rover_physics.rover.linkage import pitch_axis, place, rocker_sign
 from rover_physics.status import PoseStatus
 
 GAP_TOLERANCE = 3e-4
@@ -330,36 +330,35 @@ def write_gap_rates(linkage, placement, contacts, J, sloped):
         J: (6, 6), row per wheel, column per element of q; written.
         sloped: Whether the ground has the slope at the contact, else it is level.
     """
-    J[:, :] = 0.0
-    R, origin = placement.R, placement.origin
-    point, normal = contacts.point, contacts.normal
-    length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
-    body_x = R[0, 0], R[1, 0], R[2, 0]
-    body_y = R[0, 1], R[1, 1], R[2, 1]
-    level_y = -(R[1, 0] / length), R[0, 0] / length, 0.0
-    slope = 0.0, 0.0
-    for i in range(6):
-        side = i // 3
+    about, direction = pitch_axis(placement.R), (0.0, 0.0, 1.0)
+    for wheel in range(6):
+        normal = contacts.normal[wheel]
         if sloped:
-            slope = normal[i, 0], normal[i, 1]
-        arm = difference(point[i], origin)
-        J[i, 0] = 1.0
-        J[i, 1] = _gap_rate(body_x, arm, slope)
-        J[i, 2] = _gap_rate(level_y, arm, slope)
-        arm = difference(point[i], placement.rocker_pivots[side])
-        J[i, 3] = rocker_sign(side) * _gap_rate(body_y, arm, slope)
-        if linkage.on_bogie[i]:
-            arm = difference(point[i], placement.bogie_pivots[side])
-            J[i, 4 + side] = _gap_rate(body_y, arm, slope)
+            direction = normal[0], normal[1], 1.0
+        write_rates(linkage, placement, wheel, contacts.point[wheel], direction, about, J[wheel])
 
 
 @kernel
-def _gap_rate(axis, arm, slope):
-    """Return the change of the gap at the end of `arm` per rotation about an axis [m/rad].
+def write_rates(linkage, placement, wheel, point, direction, about, rates):
+    """Write the derivatives by q of the place of a point of a wheel along a direction.
 
-    `axis` and `arm` are (x, y, z), `slope` the (x, y) of the contact normal.
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT at q.
+        wheel: Index of the wheel.
+        point: (3,) the point [m].
+        direction: The direction (x, y, z).
+        about: The `pitch_axis`.
+        rates: (6,) written [m/m or m/rad].
     """
-    ax, ay, az = axis
-    dx, dy, dz = arm
-    nx, ny = slope
-    return nx * (ay * dz - az * dy) + ny * (az * dx - ax * dz) + (ax * dy - ay * dx)
+    R, side = placement.R, wheel // 3
+    arm, body_y = difference(point, placement.origin), (R[0, 1], R[1, 1], R[2, 1])
+    rates[:] = 0.0
+    rates[0] = direction[2]
+    rates[1] = dot(direction, cross((R[0, 0], R[1, 0], R[2, 0]), arm))
+    rates[2] = dot(direction, cross(about, arm))
+    arm = difference(point, placement.rocker_pivots[side])
+    rates[3] = rocker_sign(side) * dot(direction, cross(body_y, arm))
+    if linkage.on_bogie[wheel]:
+        arm = difference(point, placement.bogie_pivots[side])
+        rates[4 + side] = dot(direction, cross(body_y, arm))

@@ -11,10 +11,14 @@ wheel has a positive angle.
 import numpy as np
 
 from rover_physics.contact.cell_search import look_everywhere
-from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import SearchScope, write_point
 from rover_physics.contact.rim_scan import find_tops, scan_carefully, scan_rims
-from rover_physics.contact.tracking import follow_contact, keep_contact, look_at_kept
+from rover_physics.contact.tracking import (
+    follow_contact,
+    keep_contact,
+    look_at_kept,
+    search_circle,
+)
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.ground import height_inside, to_cells

@@ -25,6 +25,8 @@ FREE_TORQUES = 5
 """Degrees of freedom of the torques: extra traction of each wheel except the last."""
 FREE_FORCES = FREE_TORQUES + FREE_LATERAL_WHEELS
 """Degrees of freedom of torques and lateral forces together; four are lateral."""
+BODY, ROCKER, BOGIE = range(3)
+"""Links that carry a part."""
 
 BALANCE = record_type(
     ("normal", float, (6, 1 + FREE_FORCES)),  # wheel loads N
@@ -33,6 +35,11 @@ BALANCE = record_type(
     ("A", float, (UNKNOWNS, UNKNOWNS)),  # work space: the equations
     ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
     ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
+    (
+        "units",
+        float,
+        (6, 3, UNKNOWNS),
+    ),  # terms of unit forces N, T, S of each wheel in the equations
     ("shares", SHARES),  # shares of the wheels in the common forces
 )
 """Forces of a settled rover as linear functions of its free forces, over the rover's weight.
@@ -98,63 +105,48 @@ def write_equations(linkage, placement, contacts, columns, balance):
     y, z over weight times reference length; right and left bogie; differential. Arguments are as
     for `balance_forces`; `balance.shares` is as `write_shares` writes it.
     """
-    A, B, frames = balance.A, balance.B, balance.frames
-    _write_frames(placement, contacts, frames)
+    A, B, units = balance.A, balance.B, balance.units
     common, free = balance.shares.common, balance.shares.free
-    A[:, :] = 0.0
-    B[:, :] = 0.0
-    R, length = placement.R, linkage.length
+    _write_frames(placement, contacts, balance.frames)
     for wheel in range(6):
-        side, (x, y, z) = wheel // 3, difference(contacts.point[wheel], placement.origin)
-        arm = x / length, y / length, z / length
-        for kind in range(3):
-            force = frames[wheel, kind, 0], frames[wheel, kind, 1], frames[wheel, kind, 2]
-            moment = cross(arm, force)
-            about_axis = dot(moment, (R[0, 1], R[1, 1], R[2, 1]))
-            about = _moment_about(linkage, placement, placement.rocker_pivots[side], force)
-            about_rocker, about_bogie = about_axis - about, 0.0
-            if linkage.on_bogie[wheel]:
-                about = _moment_about(linkage, placement, placement.bogie_pivots[side], force)
-                about_bogie = about_axis - about
-            wrench = *force, *moment, about_bogie, rocker_sign(side) * about_rocker
-            column, share = wheel, 1.0  # variables: literals would be types of their own
-            if kind == 1:
-                column, share = 8, common[wheel, 2]
-            elif kind == 2:
-                column, share = 6, common[wheel, 0]
-            _add_column(A, column, share, wrench, side)
-            if kind == 2:
-                _add_column(A, column + 1, common[wheel, 1], wrench, side)
-            own = 0
-            if kind == 1 and wheel < FREE_TORQUES:
-                own = 1 + wheel
-            elif kind == 2:
-                for k in range(FREE_LATERAL_WHEELS):
-                    if free[k] == wheel:
-                        own = 1 + FREE_TORQUES + k
-            if 0 < own < columns:
-                _add_column(B, own, -1.0, wrench, side)
+        _write_units(linkage, placement, contacts, balance, wheel)
+    for row in range(UNKNOWNS):
+        share, slope, traction = 0.0, 0.0, 0.0
+        for wheel in range(6):
+            A[row, wheel] = units[wheel, 0, row]
+            share += common[wheel, 0] * units[wheel, 2, row]
+            slope += common[wheel, 1] * units[wheel, 2, row]
+            traction += common[wheel, 2] * units[wheel, 1, row]
+        A[row, 6], A[row, 7], A[row, 8], B[row, 0] = share, slope, traction, 0.0
+        for k in range(1, columns):
+            wheel, kind = k - 1, 1
+            if k > FREE_TORQUES:
+                wheel, kind = free[k - 1 - FREE_TORQUES], 2
+            B[row, k] = -units[wheel, kind, row]
     _add_weights(linkage, placement, B)
     if linkage.has_tool_load:
         _add_tool_load(linkage, placement, B)
 
 
 @kernel
-def _add_column(matrix, column, share, wrench, side):
-    """Add `share` of a wheel's unit force to a column of the nine equations.
-
-    `wrench` holds the force (3), the moment about the origin (3), the moment about the bogie pivot
-    of its side, and its term in the equation of the differential.
-    """
-    fx, fy, fz, mx, my, mz, about_bogie, about_differential = wrench
-    matrix[0, column] += share * fx
-    matrix[1, column] += share * fy
-    matrix[2, column] += share * fz
-    matrix[3, column] += share * mx
-    matrix[4, column] += share * my
-    matrix[5, column] += share * mz
-    matrix[6 + side, column] += share * about_bogie
-    matrix[8, column] += share * about_differential
+def _write_units(linkage, placement, contacts, balance, wheel):
+    """Write the terms of the unit forces N, T and S of a wheel in the nine equations."""
+    R, length, side = placement.R, linkage.length, wheel // 3
+    x, y, z = difference(contacts.point[wheel], placement.origin)
+    arm = x / length, y / length, z / length
+    for kind in range(3):
+        unit, frame = balance.units[wheel, kind], balance.frames[wheel, kind]
+        force = frame[0], frame[1], frame[2]
+        moment = cross(arm, force)
+        about_axis = dot(moment, (R[0, 1], R[1, 1], R[2, 1]))
+        unit[0], unit[1], unit[2] = force
+        unit[3], unit[4], unit[5] = moment
+        unit[6] = unit[7] = 0.0
+        if linkage.on_bogie[wheel]:
+            about = _moment_about(linkage, placement, placement.bogie_pivots[side], force)
+            unit[6 + side] = about_axis - about
+        about = _moment_about(linkage, placement, placement.rocker_pivots[side], force)
+        unit[8] = rocker_sign(side) * (about_axis - about)
 
 
 @kernel
@@ -169,17 +161,21 @@ def _moment_about(linkage, placement, pivot, force):
 def _add_weights(linkage, placement, B):
     """Add the weights of all parts to the right-hand side."""
     for part in range(5):
+        carrier = (part + 1) // 2
         mass = linkage.body_mass
-        if part > 2:
-            mass = linkage.bogie_mass
-        elif part > 0:
+        if carrier == ROCKER:
             mass = linkage.rocker_mass
-        hangs = (part - 1) % 2, part > 0, part > 2
-        _add_weight(linkage, placement, B, (mass, placement.part_coms[part]), hangs)
+        elif carrier == BOGIE:
+            mass = linkage.bogie_mass
+        _add_weight(
+            linkage, placement, B, mass, placement.part_coms[part], (part - 1) % 2, carrier
+        )
     for wheel in range(6):
-        hangs = wheel // 3, wheel >= 0, linkage.on_bogie[wheel] > 0
-        load = linkage.wheel_mass, placement.centres[wheel]
-        _add_weight(linkage, placement, B, load, hangs)
+        side, carrier = wheel // 3, ROCKER
+        if linkage.on_bogie[wheel]:
+            carrier = BOGIE
+        centre = placement.centres[wheel]
+        _add_weight(linkage, placement, B, linkage.wheel_mass, centre, side, carrier)
 
 
 @kernel
@@ -205,32 +201,35 @@ def tool_load(R, tool, i):
 
 
 @kernel
-def _add_weight(linkage, placement, B, load, hangs):
+def _add_weight(linkage, placement, B, mass, point, side, carrier):
     """Add the weight of one part to the right-hand side.
 
     Args:
         linkage: LINKAGE.
         placement: PLACEMENT.
         B: Right-hand sides; the weight is added to column 0.
-        load: (mass [kg], centre of mass (3,) [m]).
-        hangs: (side, whether the part hangs on the rocker, whether on the bogie).
+        mass: Mass [kg].
+        point: (3,) centre of mass [m].
+        side: 0 right, 1 left.
+        carrier: The link that it is part of, or hangs on: BODY, ROCKER or BOGIE.
     """
-    R, origin, length = placement.R, placement.origin, linkage.length
-    mass, point = load
-    side, on_rocker, on_bogie = hangs
-    weight = mass / linkage.mass
-    rx = (point[0] - origin[0]) / length
-    ry = (point[1] - origin[1]) / length
+    origin, length, weight = placement.origin, linkage.length, mass / linkage.mass
     B[2, 0] += weight
-    B[3, 0] += ry * weight
-    B[4, 0] -= rx * weight
-    if not on_rocker:
+    B[3, 0] += (point[1] - origin[1]) / length * weight
+    B[4, 0] -= (point[0] - origin[0]) / length * weight
+    if carrier == BODY:
         return
-    px = (placement.rocker_pivots[side, 0] - origin[0]) / length
-    py = (placement.rocker_pivots[side, 1] - origin[1]) / length
-    about = weight * ((ry - py) * R[0, 1] - (rx - px) * R[1, 1])
+    about = weight * _level_arm(linkage, placement, point, placement.rocker_pivots[side])
     B[8, 0] += about if side == 0 else -about
-    if on_bogie:
-        px = (placement.bogie_pivots[side, 0] - origin[0]) / length
-        py = (placement.bogie_pivots[side, 1] - origin[1]) / length
-        B[6 + side, 0] += weight * ((ry - py) * R[0, 1] - (rx - px) * R[1, 1])
+    if carrier == BOGIE:
+        arm = _level_arm(linkage, placement, point, placement.bogie_pivots[side])
+        B[6 + side, 0] += weight * arm
+
+
+@kernel
+def _level_arm(linkage, placement, point, pivot):
+    """Return the horizontal distance of a point from a pivot axis, over the reference length."""
+    R, origin, length = placement.R, placement.origin, linkage.length
+    rx, ry = (point[0] - origin[0]) / length, (point[1] - origin[1]) / length
+    px, py = (pivot[0] - origin[0]) / length, (pivot[1] - origin[1]) / length
+    return (ry - py) * R[0, 1] - (rx - px) * R[1, 1]

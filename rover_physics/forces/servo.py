@@ -74,8 +74,8 @@ def balance_servos(model, work):
                 own = SoilWheel(linkage.radius, linkage.width, mu)
                 mu = effective_friction(soil, own, 0.0)
         work.search.mu[wheel] = mu
-        servo.mu[wheel] = settings.friction_share * mu
-    servo.friction_share = settings.friction_share
+        servo.mu[wheel] = settings.friction_limit * mu
+    servo.friction_share = settings.friction_limit
     servo.radius, servo.width = linkage.radius, linkage.width
     servo.weight = linkage.mass * linkage.gravity
     return solve_servo(linkage, work, servo)
@@ -178,7 +178,7 @@ def solve_servo(linkage, work, servo):
     """
     if not find_motions(linkage, work.placement, work.contacts, work.balance, servo):
         return False
-    servo.creep, servo.stall, servo.towed, servo.deficit = CREEP, Stall.SLIDING, 0.0, 0.0
+    servo.creep, servo.stall, servo.towed, servo.deficit = CREEP, Stall.NONE, 0.0, 0.0
     share = find_drive(servo)
     if share < MIN_SPEED_SHARE:
         servo.deficit = _find_deficit(servo)

@@ -13,7 +13,7 @@ regular: "one unit forward" means that the treads travel as far as on level grou
 import numpy as np
 
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_algebra import cross, difference, dot, solve_in_place
+from rover_physics.numerics.linear_algebra import dot, solve_in_place
 from rover_physics.numerics.records import record_type
 from rover_physics.rover.linkage import rocker_sign
 from rover_physics.terrain.ground import SOIL_NUMBERS
@@ -77,7 +77,7 @@ SERVO_STATE = record_type(
     ("deviation", float, (MOTIONS,)),  # the motion less its share of the commanded one
     ("towed", float),  # speed share at which it is towed to find the deficit; 0: it is not
     ("deficit", float),  # force that is missing if the speed share is 0, negative: to brake
-    ("stall", np.int64),  # why the rover does not drive if its speed share is 0: a Stall
+    ("stall", np.int64),  # what stops the rover if its speed share is 0: a Stall
 )
 """Inputs, unknowns and results of `solve_servo`. Forces are over the rover's weight, velocities
 over the nominal speed, turning rates in rad per TURN_DISTANCE of nominal distance."""
@@ -106,8 +106,10 @@ def find_motions(linkage, placement, contacts, balance, servo):
         servo.spread[wheel] = _spread(linkage, contacts, balance, wheel)
         if servo.yields[wheel]:
             servo.spread[wheel] *= GAUSS_POINT
-        contact = contacts.point[wheel], balance.frames[wheel]
-        _write_wheel(linkage, placement, contact, wheel, X)
+        for row in range(UNKNOWNS):
+            X[row, wheel] = balance.units[wheel, 1, row]
+            X[row, 6 + wheel] = balance.units[wheel, 2, row]
+        _write_scrub(linkage, placement, balance.frames[wheel, 0], wheel, X)
     for wheel in range(6):
         for row in range(UNKNOWNS):
             X[row, SCRUB + wheel] *= servo.spread[wheel] / linkage.length
@@ -159,42 +161,17 @@ def _spread(linkage, contacts, balance, wheel):
 
 
 @kernel
-def _write_wheel(linkage, placement, contact, wheel, X):
-    """Write the terms of a wheel's unit forces in the nine equations into columns of X.
-
-    Column `wheel` is its traction, 6 + wheel its lateral force, SCRUB + wheel the moment -1 about
-    the contact normal, over the reference length. `contact` is its point and its frame.
-    """
-    point, frame = contact
-    origin, length, R = placement.origin, linkage.length, placement.R
-    side = wheel // 3
-    ax, ay, az = R[0, 1], R[1, 1], R[2, 1]
-    arm = difference(point, origin)
-    for kind in range(3):
-        column = SCRUB + wheel if kind == 2 else 6 * kind + wheel
-        for row in range(UNKNOWNS):
-            X[row, column] = 0.0
-        if kind == 2:
-            mx, my, mz = -frame[0, 0], -frame[0, 1], -frame[0, 2]
-            about_bogie = about_rocker = mx * ax + my * ay + mz * az
-        else:
-            force = frame[1 + kind, 0], frame[1 + kind, 1], frame[1 + kind, 2]
-            X[0, column], X[1, column], X[2, column] = force
-            mx, my, mz = cross(arm, force)
-            mx, my, mz = mx / length, my / length, mz / length
-            about_rocker = _moment(placement, placement.rocker_pivots[side], point, force) / length
-            about_bogie = _moment(placement, placement.bogie_pivots[side], point, force) / length
-        X[3, column], X[4, column], X[5, column] = mx, my, mz
-        X[8, column] = rocker_sign(side) * about_rocker
-        if linkage.on_bogie[wheel]:
-            X[6 + side, column] = about_bogie
-
-
-@kernel
-def _moment(placement, pivot, point, force):
-    """Return the moment of a force at a point about the pivot axis through `pivot`."""
-    R = placement.R
-    return dot(cross(difference(point, pivot), force), (R[0, 1], R[1, 1], R[2, 1]))
+def _write_scrub(linkage, placement, normal, wheel, X):
+    """Write the terms of the moment -1 about the contact normal (3,) of a wheel into X."""
+    R, side, column = placement.R, wheel // 3, SCRUB + wheel
+    for row in range(UNKNOWNS):
+        X[row, column] = 0.0
+    for i in range(3):
+        X[3 + i, column] = -normal[i]
+    about = -dot(normal, (R[0, 1], R[1, 1], R[2, 1]))
+    X[8, column] = rocker_sign(side) * about
+    if linkage.on_bogie[wheel]:
+        X[6 + side, column] = about
 
 
 @kernel

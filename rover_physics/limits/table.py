@@ -200,7 +200,7 @@ LIMITS: tuple[Limit, ...] = (
     Limit(
         "friction", "speed_share", "no forward speed balances: the wheels slide", "friction",
         lambda rover: MIN_SPEED_SHARE, Sense.LEAST, has_number=False,
-        only_if=("stalls", Stall.SLIDING), wheel_of="friction_utilisation", **ON_SERVOS,
+        only_if=("stalls", Stall.NONE), wheel_of="friction_utilisation", **ON_SERVOS,
     ),
     Limit(
         "friction", "friction_share", "all friction is used: {compared}", "friction",

@@ -37,15 +37,15 @@ def run_chunks(sweep: Callable[..., Any], inputs: tuple, chunks: int, threads: i
     """Run the chunks of a sweep, each once.
 
     Args:
-        sweep: Kernel of a sweep. Its last argument is the first chunk and the one after the last.
+        sweep: Kernel of a sweep. Its last arguments are the first chunk and the one after it.
         inputs: Its other arguments.
         chunks: Number of chunks.
         threads: Number of threads. They take one chunk after another, as poses cost differently.
     """
     if threads == 1 or chunks == 1:
-        sweep(*inputs, (0, chunks))
+        sweep(*inputs, 0, chunks)
         return
-    parts = (partial(sweep, *inputs, (k, k + 1)) for k in range(chunks))
+    parts = (partial(sweep, *inputs, k, k + 1) for k in range(chunks))
     run_in_turn(parts, min(threads, chunks))
 
 

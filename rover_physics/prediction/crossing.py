@@ -24,7 +24,6 @@ from rover_physics.prediction.path_kernels import (
     LONGEST_STEP,
     NO_CROSSINGS,
     Crossings,
-    Wheels,
     find_jumps,
     join_crossings,
     none_held,
@@ -33,10 +32,10 @@ from rover_physics.prediction.path_kernels import (
 from rover_physics.results.record import (
     forget_uncomputable,
     new_results,
-    numbers_of,
     place_results,
     select_results,
 )
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
@@ -49,7 +48,7 @@ GROUP = 32
 """Number of stretches that are halved together."""
 POSES_IN_STRETCH = 8
 """Space for so many poses is provided for each stretch at a time."""
-Searched = tuple[NDArray[np.int64], NDArray[np.int64], Wheels, int]
+Searched = tuple[NDArray[np.int64], NDArray[np.int64], int]
 """The last fields of `Stretches`."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
@@ -88,25 +87,25 @@ def find_crossings(
     path = Crossings(
         rows.astype(float), jumps[:, 1].repeat(2), none_held(len(rows)), poses[rows], at_jumps
     )
-    known = join_crossings([path, turns])
+    evaluated = join_crossings([path, turns])
     ends = np.vstack([np.arange(len(rows)).reshape(-1, 2), len(rows) + jumps_in_turns])
     path_of = np.append(0, np.cumsum(~joined))
-    at_failure = AtFailure.SEARCH_ON if model.wheels.on_servos else at_failure
+    at_failure = AtFailure.SEARCH_ON if model.on_servos else at_failure
     last = np.full(path_of[-1] + 1, len(path_of))
-    searched = last, path_of, model.wheels, int(at_failure)
-    found = _halve_in_turn(model, known, ends, searched)
-    in_turns = known.select(len(rows) + np.flatnonzero(inside))
+    searched = last, path_of, int(at_failure)
+    found = _halve_in_turn(model, evaluated, ends, searched)
+    in_turns = evaluated.select(len(rows) + np.flatnonzero(inside))
     return join_crossings([in_turns, *found, at_rest]).in_order()
 
 
 def _halve_in_turn(
-    model: PackedModel, known: Crossings, ends: NDArray[np.int64], searched: Searched
+    model: PackedModel, evaluated: Crossings, ends: NDArray[np.int64], searched: Searched
 ) -> list[Crossings]:
     """Evaluate the poses within stretches, in groups by threads.
 
     Args:
         model: The model.
-        known: Evaluated poses.
+        evaluated: Evaluated poses.
         ends: (k, 2) rows of them at the ends of the stretches.
         searched: The last fields of `Stretches`.
     """
@@ -114,36 +113,35 @@ def _halve_in_turn(
     found = [NO_CROSSINGS] * len(groups)
 
     def halve(k: int) -> None:
-        found[k] = _halve(model, known.select(groups[k].ravel()), searched)
+        found[k] = _halve(model, evaluated.select(groups[k].ravel()), searched)
 
     with limit_threads(model.relative_cost(POSES_IN_STRETCH * len(ends))) as threads:
         run_in_turn((partial(halve, k) for k in range(len(groups))), threads)
     return found
 
 
-def _halve(model: PackedModel, known: Crossings, searched: Searched) -> Crossings:
+def _halve(model: PackedModel, pairs: Crossings, searched: Searched) -> Crossings:
     """Evaluate the poses within stretches, and those of wheels that climb there.
 
     Args:
         model: The model.
-        known: (2k,) evaluated poses, by twos the ends of a stretch.
+        pairs: (2k,) evaluated poses, by twos the ends of a stretch.
         searched: As for `_halve_in_turn`.
     """
-    first, stretches = len(known.place), len(known.place) // 2
+    first, stretches = len(pairs.place), len(pairs.place) // 2
     numbers = np.array([first, first + stretches, 0])
     ends = np.vstack([np.zeros((first, 2), np.int64), np.arange(first).reshape(-1, 2)])
-    closed, works, found = np.empty((0, 2), np.int64), new_works(1, 1), known
+    closed, works, found = np.empty((0, 2), np.int64), new_works(1, 1), pairs
     while numbers[Progress.NEXT] < numbers[Progress.ROWS]:
         check_interruption()
         more = numbers[Progress.ROWS] - len(found.place) + POSES_IN_STRETCH * stretches + 2
         found = join_crossings([found, _unasked(more)])
         rows = len(found.place)
-        ends, closed = (np.resize(pairs, (rows, 2)) for pairs in (ends, closed))
+        ends, closed = (np.resize(rows_of, (rows, 2)) for rows_of in (ends, closed))
         asked = Stretches(ends, found.place, found.waypoint, closed, numbers, *searched)
-        written, motions = (found.results, numbers_of(found.results)), np.empty((rows, 3))
-        places = found.poses, motions, NONE_HELD
-        limits = model.limits.records
-        evaluate_poses(model.records[None], limits, places, asked, works, written, (0, 1))
+        places = found.poses, np.empty((rows, 3)), NONE_HELD
+        sweep = model.records[None], model.limits.records, *places, asked, works, found.results
+        evaluate_poses(*sweep, 0, 1)
     end, (last, path_of, *_) = numbers[Progress.ROWS], searched
     forget_uncomputable(found.results[first:end])
     closed = closed[: numbers[Progress.CLOSED]]
@@ -167,7 +165,7 @@ def list_jumps(
     """Return the neighbours between which to search, as rows (k, 2)."""
     jumps = np.empty((len(poses), 2), np.int64)
     joined = np.array(joined)  # a kernel is compiled for each layout, and for read-only arrays
-    return jumps[: find_jumps(results, poses, joined, model.wheels, jumps)]
+    return jumps[: find_jumps(model.records, results, poses, joined, jumps)]
 
 
 def _divide_turns(
@@ -216,25 +214,24 @@ def find_turns(
     Returns:
         (k, 2) first waypoints of these steps and numbers of pieces TURN_SPACING apart.
     """
-    wheels, steps = model.wheels, steps_between(poses[:-1], poses[1:])
-    swing = wheels.swing_radius * np.abs(steps[:, 2])
-    longest = LONGEST_STEP * wheels.radius
-    far = swing > np.maximum(longest, np.hypot(steps[:, 0], steps[:, 1]))
+    radius, steps = model.rover.wheel.radius, steps_between(poses[:-1], poses[1:])
+    swing = swing_radius(model.rover) * np.abs(steps[:, 2])
+    far = swing > np.maximum(LONGEST_STEP * radius, np.hypot(steps[:, 0], steps[:, 1]))
     rows = np.flatnonzero(joined & far & (results["motion"][1:, 2] != 0.0))
-    pieces = np.ceil(swing[rows] / (TURN_SPACING * wheels.radius)).astype(np.int64)
+    pieces = np.ceil(swing[rows] / (TURN_SPACING * radius)).astype(np.int64)
     return np.column_stack([rows, pieces])
 
 
-def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:
+def climb_faces(model: PackedModel, evaluated: Crossings, ends: np.ndarray) -> Crossings:
     """Evaluate wheels that jump up at one place, held at stages between foot and edge.
 
     Args:
         model: The model.
-        known: Evaluated poses.
-        ends: (k, 2) rows of `known` before and after each place.
+        evaluated: Evaluated poses.
+        ends: (k, 2) rows of them before and after each place.
     """
-    terrain, radius = model.terrain, model.wheels.radius
-    before, after = known.results["wheel_centres"][ends].swapaxes(0, 1)
+    terrain, radius = model.terrain, model.rover.wheel.radius
+    before, after = evaluated.results["wheel_centres"][ends].swapaxes(0, 1)
     rise = (after - before)[:, :, 2]
     climbing = rise > 0.05 * radius
     at = np.flatnonzero(np.any(climbing & (rise > HEIGHT_JUMP * radius), axis=1))
@@ -242,8 +239,8 @@ def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Cross
         return NO_CROSSINGS
     stages, foot, top = len(CLIMB_STAGES), ends[at, 0], ends[at, 1]
     row, wheel = np.nonzero(climbing[at])
-    backward = known.results["wheel_speed"][top[row], wheel] < 0.0
-    course = known.poses[foot[row], 2] + known.results["steering_angle"][top[row], wheel]
+    backward = evaluated.results["wheel_speed"][top[row], wheel] < 0.0
+    course = evaluated.poses[foot[row], 2] + evaluated.results["steering_angle"][top[row], wheel]
     centres = before[at[row], wheel]
     face, edge = _faces_ahead(terrain, radius, centres, course + np.where(backward, np.pi, 0.0))
     heights = centres[:, 2:] + CLIMB_STAGES * rise[at[row], wheel][:, None]
@@ -252,14 +249,14 @@ def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Cross
     touching = (CLIMB_STAGES > 0.0) | (heights > edge[:, None])
     held = none_held(len(at) * stages).reshape(len(at), stages, 6, 2)
     held[row, :, wheel] = np.stack([np.where(touching, heights, np.nan), angles], axis=-1)
-    poses = np.repeat(known.poses[foot], stages, axis=0)
-    motions = np.repeat(known.results["motion"][top], stages, axis=0)
+    poses = np.repeat(evaluated.poses[foot], stages, axis=0)
+    motions = np.repeat(evaluated.results["motion"][top], stages, axis=0)
     results = model.evaluate(poses, held.reshape(-1, 6, 2), motions)
-    start, end = known.place[ends[at]].T[:, :, None]
+    start, end = evaluated.place[ends[at]].T[:, :, None]
     settled = (results["status"] == PoseStatus.SETTLED).reshape(-1, stages)
     climbs = Crossings(
         (start + CLIMB_STAGES * (end - start)).ravel(),
-        np.repeat(known.waypoint[foot], stages),
+        np.repeat(evaluated.waypoint[foot], stages),
         held.reshape(-1, 6, 2),
         poses,
         results,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wheels that roll off an edge: where they fall, and how far they drop.
+"""Wheels that roll off an edge: where they fall, how far they drop, and what else that decides.
 
 A wheel falls where its contact is behind it, and neither friction nor the motors balance it there.
 All wheels that are beyond their limits must be such wheels: else the rover cannot drive on. Where
@@ -8,6 +8,9 @@ would have to go down faster than the rover drives. Until it lands no balance is
 height of the drop is a result. A wheel that would come down farther than its limit without a WALL
 does not fall: it slips on a slope, and friction is what is missing. More friction or torque lets
 more wheels balance, so it never refuses a path that passes with less.
+
+A wheel that rolls off an edge needs no equilibrium. So a pose at which one may do so may keep
+limits that it breaks; other poses that break a limit fail, whatever the path around them decides.
 """
 
 from dataclasses import dataclass
@@ -24,11 +27,12 @@ from rover_physics.prediction.path_kernels import (
     MIN_SPACING,
     ROUNDING,
     Crossings,
-    Wheels,
     angle_ahead,
     distance_between,
     force_limit,
 )
+from rover_physics.results.uses import find_broken
+from rover_physics.status import PoseStatus, TorquePolicy
 
 MIN_ANGLE = np.radians(15.0)
 """Least steepness [rad] of a contact behind a wheel from which it falls."""
@@ -55,24 +59,25 @@ class Drops:
     """(n,) True for those of them from which the drops can be found without waypoints before."""
 
 
-def find_drops(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Crossings) -> Drops:
+def find_drops(models: np.ndarray, poses: np.ndarray, results: Any, crossings: Crossings) -> Drops:
     """Find where wheels roll off edges along a path, and how far they drop.
 
     Args:
-        wheels: Size of wheels and rover, and the limits of the forces.
+        models: (1,) MODEL of the rover, or more, of which the first counts.
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
         results: (n,) RESULT of each waypoint.
         crossings: Poses between the waypoints.
     """
     path = view_read_only(poses), view_read_only(results)
     order = crossings.order_among(len(poses))
-    return Drops(*_find_drops(wheels, *path, crossings.views, order))
+    return Drops(*_find_drops(models, *path, crossings.views, order))
 
 
 @allocating_kernel
-def _find_drops(wheels, poses, results, between, order):
+def _find_drops(models, poses, results, between, order):
     """Return the fields of `Drops`; `order` is that of `order_among`, of `between` Crossings."""
-    n, m = len(poses), len(between.place)
+    model, n, m = models[0], len(poses), len(between.place)
+    linkage = model.linkage
     steps = np.zeros(n + m)
     height, rolling_off_edge = np.empty((n + m, 6)), np.zeros((n + m, 6), np.bool_)
     angle, last = np.empty((n + m, 6)), poses[0]
@@ -80,21 +85,21 @@ def _find_drops(wheels, poses, results, between, order):
         i = order[k]
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
-        steps[k] = distance_between(last, here, wheels.swing_radius)
+        steps[k] = distance_between(last, here, linkage.swing_radius)
         lowest, last = 0.0, here
         for wheel in range(6):
             angle[k, wheel] = angle_ahead(result, wheel)
             height[k, wheel] = result.wheel_centres[wheel, 2]
             lowest = min(lowest, angle[k, wheel])
         if lowest < -MIN_ANGLE:
-            some, on_edges = may_roll_off_edge(result, wheels)
+            some, on_edges = _may_roll_off_edge(model, result)
             for wheel in range(6):
-                rolls = some and _rolls_off_edge(result, wheels, wheel, on_edges)
+                rolls = some and _rolls_off_edge(model, result, wheel, on_edges)
                 rolling_off_edge[k, wheel] = rolls
     first_open = _clear_open_runs(rolling_off_edge)
-    _clear_slides(height, angle, wheels.drop_limit, rolling_off_edge)
+    _clear_slides(height, angle, model.settings.drop_limit, rolling_off_edge)
     descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
-    _measure_drops(wheels.radius, (height, angle, steps), rolling_off_edge, descents)
+    _measure_drops(linkage.radius, height, angle, steps, rolling_off_edge, descents)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
     decided, starts = 0, np.zeros(n, np.bool_)
     for k in range(n + m):
@@ -116,10 +121,10 @@ def _find_drops(wheels, poses, results, between, order):
 
 
 @exact_kernel
-def _is_held(result, wheels, wheel):
+def _is_held(model, result, wheel):
     """Return whether a wheel is on the ground, within the limits of friction and torque."""
-    friction = force_limit(wheels.friction_limit, result.kept_share)
-    torque = force_limit(wheels.torque_limit, result.kept_share)
+    friction = force_limit(model.settings.friction_limit, result.kept_share)
+    torque = force_limit(model.settings.torque_limit, result.kept_share)
     return (
         result.wheel_loads[wheel] >= 0.0
         and result.friction_utilisation[wheel] <= friction
@@ -128,7 +133,7 @@ def _is_held(result, wheels, wheel):
 
 
 @exact_kernel
-def may_roll_off_edge(result, wheels):
+def _may_roll_off_edge(model, result):
     """Return whether some wheels may roll off an edge; the path around the pose decides.
 
     None does if the rover as a whole goes downhill: it then slides. Also return whether all wheels
@@ -136,13 +141,13 @@ def may_roll_off_edge(result, wheels):
     """
     on_edges = True
     for wheel in range(6):
-        if angle_ahead(result, wheel) >= -MIN_ANGLE and not _is_held(result, wheels, wheel):
+        if angle_ahead(result, wheel) >= -MIN_ANGLE and not _is_held(model, result, wheel):
             on_edges = False
     count, others, least_held = 0, 0.0, np.inf
     for wheel in range(6):
         mu, angle = result.friction[wheel], angle_ahead(result, wheel)
         least_held = min(least_held, np.arctan(mu) if mu == mu else np.arctan(1.0))
-        if _rolls_off_edge(result, wheels, wheel, on_edges):
+        if _rolls_off_edge(model, result, wheel, on_edges):
             count += 1
         elif angle == angle:
             others += angle
@@ -151,10 +156,10 @@ def may_roll_off_edge(result, wheels):
 
 
 @exact_kernel
-def _rolls_off_edge(result, wheels, wheel, on_edges):
+def _rolls_off_edge(model, result, wheel, on_edges):
     """Return whether a wheel goes down too steeply to roll, or is at an edge and not held."""
     angle = angle_ahead(result, wheel)
-    slips = on_edges and angle < -MIN_ANGLE and not _is_held(result, wheels, wheel)
+    slips = on_edges and angle < -MIN_ANGLE and not _is_held(model, result, wheel)
     return angle < -FACE or slips
 
 
@@ -202,14 +207,13 @@ def _clear_slides(height, angle, limit, rolling_off_edge):
 
 
 @exact_kernel
-def _measure_drops(radius, course, rolling_off_edge, descents):
+def _measure_drops(radius, height, angle, steps, rolling_off_edge, descents):
     """Add up the descent [m] of wheels that roll off edges; a sudden one at one place also counts.
 
     What a wheel rises meanwhile, such as when the one beside it falls, is subtracted. Where a fall
     begins or ends between two poses, the share of the step in which the wheel falls counts.
-    `course` is heights (k, 6) [m], contact angles (k, 6) [rad] and steps (k,) [m].
+    Heights (k, 6) and steps (k,) are in [m], contact angles (k, 6) in [rad].
     """
-    height, angle, steps = course
     for wheel in range(6):
         so_far = 0.0
         for k in range(1, steps.size):
@@ -242,3 +246,50 @@ def _share_of_drop(angle, other):
     if flat >= -FACE > steep:
         return 1.0 if flat - steep > ANGLE_JUMP else (steep + FACE) / (steep - flat)
     return 0.5
+
+
+@exact_kernel
+def find_suspects(models, limits, results):
+    """Return the first row that may break a limit, and the first that does so in any case; or -1.
+
+    Args:
+        models: (1,) MODEL, or more, of which the first counts.
+        limits: (k,) LIMIT.
+        results: (n,) RESULT; what the path around a row decides is not known yet.
+    """
+    suspect = -1
+    for row in range(results.size):
+        may_fail, fails = look_for_failure(models[0], limits, results[row])
+        suspect = row if suspect < 0 and may_fail else suspect
+        if fails:
+            return suspect, row
+    return suspect, -1
+
+
+@exact_kernel
+def look_for_failure(model, limits, result):
+    """Return whether a RESULT may break a limit, and whether it does so in any case."""
+    broken, in_any_case = 0, 0
+    if result.status == PoseStatus.SETTLED:
+        broken, in_any_case = find_broken(result, limits)
+    if broken < 0:
+        return False, False
+    return True, in_any_case >= 0 or not _path_decides(model, result)
+
+
+@exact_kernel
+def _path_decides(model, result):
+    """Return whether the path around a pose may decide that a wheel rolls off an edge there."""
+    if model.settings.policy != TorquePolicy.SERVO:
+        return _may_roll_off_edge(model, result)[0]
+    steepest = 0.0
+    for wheel in range(6):
+        steepest = min(steepest, angle_ahead(result, wheel))
+    return steepest < -MIN_ANGLE
+
+
+@exact_kernel
+def mark_failures(models, limits, results, fails):
+    """Write True into fails (n,) for RESULTs (n,) that break a limit in any case."""
+    for row in range(results.size):
+        fails[row] = look_for_failure(models[0], limits, results[row])[1]

@@ -42,7 +42,9 @@ SETTINGS = record_type(
     ("allowed_friction", float),  # largest use of friction within safety limit and control margin
     ("control_margin", float),  # share of the limits of friction and torque left to the controller
     ("servo_droop", float),  # share of the nominal speed that a servo loses at full torque
-    ("friction_share", float),  # share of the friction that policy SERVO may use
+    ("friction_limit", float),  # safety limit of the friction utilisation, as of the next two
+    ("torque_limit", float),  # that of the torque saturation
+    ("drop_limit", float),  # largest drop of a wheel [m]
     ("on_soil", np.bool_),  # whether the terrain or the options name soils; else Coulomb friction
     ("direction", float),  # 1 if the rover drives forwards, -1 if backwards
     ("held_steering", float, (6,)),  # angles of the wheels [rad]; NaN: those of the motion
@@ -106,7 +108,9 @@ def new_works(threads: int, poses: int) -> Any:
 
 
 @kernel
-def evaluate_poses(models, limits, places, stretches, works, written, part):
+def evaluate_poses(
+    models, limits, poses, motions, held, stretches, works, results, first_chunk, end_chunk
+):
     """Evaluate the poses of some chunks into results, one chunk per work space.
 
     With stretches, it evaluates what they ask for, from the next row on and as long as there is
@@ -117,28 +121,29 @@ def evaluate_poses(models, limits, places, stretches, works, written, part):
             alone: the rover settles in all of them as in the first; (1, 1) or (1, 3) with
             stretches.
         limits: (k,) LIMIT.
-        places: `poses`, `motions` and `held` of `PackedModel.evaluate`.
+        poses: As for `PackedModel.evaluate`, as are motions and held.
+        motions: Above.
+        held: Above.
         stretches: Stretches, or NO_STRETCHES.
         works: (chunks,) WORK.
-        written: RESULTs (n m,), those of a pose side by side, and the same as numbers
-            (n m, RESULT_COLUMNS), written.
-        part: The first chunk and the one after the last.
+        results: RESULTs (n m,), those of a pose side by side, written.
+        first_chunk: The first chunk.
+        end_chunk: The one after the last.
     """
-    (poses, motions, held), chunks = places, works.size
-    n, divides = poses.shape[0], stretches.ends.shape[0] > 0
-    for chunk in range(part[0], part[1]):
+    n, chunks, divides = poses.shape[0], works.size, stretches.ends.shape[0] > 0
+    for chunk in range(first_chunk, end_chunk):
         i, end = n * chunk // chunks, n * (chunk + 1) // chunks
         if divides:
             i, end = stretches.numbers[Progress.NEXT], stretches.numbers[Progress.ROWS]
         while i < end and (not divides or end + 2 <= n):
-            if divides and not ask_middle(stretches, poses, motions, written[0], i):
-                written[0][i].status = PoseStatus.NOT_SETTLED.value
+            if divides and not ask_middle(stretches, poses, motions, results, i):
+                results[i].status = PoseStatus.NOT_SETTLED.value
             else:
                 set_pose(models[0, 0], poses, motions, i, works[chunk])
                 hold_wheels(held, i, works[chunk].contacts)
-                _evaluate_rows(models, limits, works[chunk], written, i)
+                _evaluate_rows(models, limits, works[chunk], results, i)
                 if divides:
-                    halve(stretches, poses, written, limits, i)
+                    halve(stretches, models[0, 0], limits, poses, results, i)
                     end = stretches.numbers[Progress.ROWS]
             i += 1
         if divides:
@@ -146,13 +151,13 @@ def evaluate_poses(models, limits, places, stretches, works, written, part):
 
 
 @kernel
-def _evaluate_rows(models, limits, work, written, i):
+def _evaluate_rows(models, limits, work, results, i):
     """Evaluate all models at pose i of the work space, into their rows; as `evaluate_poses`."""
     status, variants = stand(models[0, 0], work), models.shape[0]
     for k in range(variants):
         if k > 0 and status == PoseStatus.SETTLED:
             place_masses(models[k, 0].linkage, work.q, work.placement)
-        _evaluate_row(models[k], limits, work, status, written, i * variants + k)
+        _evaluate_row(models[k], limits, work, status, results[i * variants + k])
 
 
 @kernel
@@ -177,8 +182,8 @@ def set_pose(model, poses, motions, i, work):
 
 
 @kernel
-def _evaluate_row(models, limits, work, status, written, i):
-    """Evaluate a rover for which `stand` has returned a status into row i of results.
+def _evaluate_row(models, limits, work, status, result):
+    """Evaluate a rover for which `stand` has returned a status.
 
     If the rover does not settle or its forces do not balance, only motion, steering and status are
     written. If a number is none, the status says so: NaN would keep every limit.
@@ -192,16 +197,14 @@ def _evaluate_row(models, limits, work, status, written, i):
         limits: (k,) LIMIT.
         work: WORK.
         status: A PoseStatus.
-        written: RESULTs and the same as numbers, written.
-        i: The row.
+        result: RESULT, written.
     """
-    results, numbers = written
-    _write_motion(models[0].linkage, work, results[i])
+    _write_motion(models[0].linkage, work, result)
     for k in range(models.size):
-        evaluate_stance(models[k], work, status, results[i])
+        evaluate_stance(models[k], work, status, result)
         if k + 1 == models.size or status != PoseStatus.SETTLED:
             break
-        if results[i].status == PoseStatus.SETTLED and find_broken(numbers, i, limits)[0] < 0:
+        if result.status == PoseStatus.SETTLED and find_broken(result, limits)[0] < 0:
             break
 
 
@@ -344,7 +347,7 @@ def _write_forces(model, work, result):
     if settings.policy == TorquePolicy.SERVO:
         write_servo_forces(model, work, result)
         return
-    result.speed_share, result.stalls = 1.0, Stall.SLIDING.value
+    result.speed_share, result.stalls = 1.0, Stall.NONE.value
     result.friction_share = result.torque_share = result.deficit = 0.0
     result.deviation[:] = 0.0
     result.lift_rate[:] = 0.0

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rover_physics.numerics.kernels import exact_kernel
-from rover_physics.prediction.failures import find_suspects
+from rover_physics.prediction.drops import look_for_failure
 from rover_physics.prediction.path_kernels import (
     MIN_SPACING,
-    Wheels,
     distance_between,
     jumps_between,
     turn_between,
@@ -62,17 +61,14 @@ class Stretches(NamedTuple):
     last: np.ndarray
     """(paths,) last waypoint of each path that is searched; may be shared by threads."""
     path: np.ndarray
-    """(waypoints,) path of each waypoint, read only, as are the next two."""
-    wheels: Wheels
-    """Size of wheels and rover, and limits of the forces."""
+    """(waypoints,) path of each waypoint, read only, as is the next."""
     at_failure: int
     """An AtFailure."""
 
 
 NO_STRETCHES = Stretches(
     np.empty((0, 2), np.int64), np.empty(0), np.empty(0, np.int64), np.empty((0, 2), np.int64),
-    np.zeros(3, np.int64), np.empty(0, np.int64), np.empty(0, np.int64),
-    Wheels(0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0), int(AtFailure.SEARCH_ON),
+    np.zeros(3, np.int64), np.empty(0, np.int64), np.empty(0, np.int64), int(AtFailure.SEARCH_ON),
 )  # fmt: skip
 """Value of `stretches` where poses are given."""
 
@@ -98,23 +94,21 @@ def ask_middle(stretches, poses, motions, results, row):
 
 
 @exact_kernel
-def halve(stretches, poses, written, limits, row):
+def halve(stretches, model, limits, poses, results, row):
     """Ask for the halves of a stretch whose middle is evaluated, or close it.
 
     It is closed where a contact jumps but the rover does not settle in the middle.
     """
-    results, numbers = written
     before, after = stretches.ends[row, 0], stretches.ends[row, 1]
     if results[row].status == PoseStatus.NOT_SETTLED:
-        if jumps_between(results[before], results[after], stretches.wheels):
+        if jumps_between(model, results[before], results[after]):
             _close(stretches, before, after)
         return
-    here = slice(row, row + 1)
     stops = stretches.at_failure != AtFailure.SEARCH_ON
-    if stops and find_suspects(results[here], numbers[here], limits, stretches.wheels)[1] >= 0:
+    if stops and look_for_failure(model, limits, results[row])[1]:
         _leave(stretches, stretches.waypoint[row])
-    _sort_half(stretches, poses, results, before, row)
-    _sort_half(stretches, poses, results, row, after)
+    _sort_half(stretches, model, poses, results, before, row)
+    _sort_half(stretches, model, poses, results, row, after)
 
 
 @exact_kernel
@@ -127,14 +121,14 @@ def _leave(stretches, waypoint):
 
 
 @exact_kernel
-def _sort_half(stretches, poses, results, before, after):
+def _sort_half(stretches, model, poses, results, before, after):
     """Close a half, ask for its middle, or leave it as it is."""
-    wheels, numbers = stretches.wheels, stretches.numbers
-    distance = distance_between(poses[before], poses[after], wheels.swing_radius)
-    is_place = distance < MIN_SPACING * wheels.radius
-    if is_place and jumps_between(results[before], results[after], wheels):
+    linkage, numbers = model.linkage, stretches.numbers
+    distance = distance_between(poses[before], poses[after], linkage.swing_radius)
+    is_place = distance < MIN_SPACING * linkage.radius
+    if is_place and jumps_between(model, results[before], results[after]):
         _close(stretches, before, after)
-    elif wanted_spacing(results[before], results[after], wheels) < distance:
+    elif wanted_spacing(model, results[before], results[after]) < distance:
         row = numbers[Progress.ROWS]
         stretches.ends[row, 0], stretches.ends[row, 1] = before, after
         numbers[Progress.ROWS] = row + 1

@@ -12,7 +12,7 @@ from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
 from rover_physics.limits import table
 from rover_physics.limits.table import Limit
-from rover_physics.names import SERVO, WHEEL_POSITIONS
+from rover_physics.names import SERVO
 from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.records import new_record
@@ -29,12 +29,10 @@ from rover_physics.prediction.evaluation import (
 )
 from rover_physics.prediction.halving import NO_STRETCHES
 from rover_physics.prediction.known_poses import KnownPoses
-from rover_physics.prediction.path_kernels import Wheels
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.results.record import (
     clear_results,
     forget_uncomputable,
-    numbers_of,
     unwritten_results,
 )
 from rover_physics.results.uses import RoverLimits, SameObject, limits_of
@@ -85,21 +83,10 @@ class PackedModel:
         """Friction, torque limit, policy and the other options in force, as SETTINGS."""
         return self.record.settings
 
-    @cached_property
-    def wheels(self) -> Wheels:
-        """Size and limits of the rover's wheels."""
-        linkage, limits = self.record.linkage, self.rover.limits
-        return Wheels(
-            float(linkage.radius),
-            float(linkage.swing_radius),
-            float(limits.friction_utilisation),
-            float(limits.torque_saturation),
-            float(limits.wheel_drop),
-            self.options.policy == SERVO,
-            float(self.rover.wheel.max_speed),
-            float(linkage.steering_rate),
-            WHEEL_POSITIONS.index(self.rover.suspension.rocker_wheel),
-        )
+    @property
+    def on_servos(self) -> bool:
+        """True under policy "servo": wheels may be at their limits."""
+        return self.options.policy == SERVO
 
     def change(self, **options: Any) -> "PackedModel":
         """Return the rover on its terrain with other values of some options."""
@@ -164,8 +151,7 @@ class PackedModel:
                 rows = results[part.start * count : part.stop * count]
                 clear_results(rows)
                 places = poses[part], motions[part], held[part]
-                written = rows, numbers_of(rows)
-                sweep = variants, self.limits.records, places, NO_STRETCHES, works, written
+                sweep = variants, self.limits.records, *places, NO_STRETCHES, works, rows
                 run_chunks(evaluate_poses, sweep, len(works), threads)
                 forget_uncomputable(rows)
         return results.reshape(-1, count)
@@ -238,7 +224,9 @@ def _pack_request(
         max_torque=float(torque),
         control_margin=float(options.kept_margin),
         servo_droop=float(rover.wheel.servo_droop),
-        friction_share=float(rover.limits.friction_utilisation),
+        friction_limit=float(rover.limits.friction_utilisation),
+        torque_limit=float(rover.limits.torque_saturation),
+        drop_limit=float(rover.limits.wheel_drop),
         on_soil=on_soil,
         direction=options.direction,
         held_steering=np.nan,

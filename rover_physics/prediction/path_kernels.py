@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rover_physics.numerics.arrays import Floats, view_read_only
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.results.record import join_results, new_results, select_results
-from rover_physics.status import PoseStatus
+from rover_physics.status import PoseStatus, TorquePolicy
 
 LONGEST_STEP = 1.0 + 1e-6
 """Distance [wheel radii] of neighbours up to which it is looked at what lies between: a radius,
@@ -41,29 +41,6 @@ ROUNDING = 1e-9
 """Descent [m] below which it counts as zero, and excess of a force limit that does."""
 AT_LIMIT = 0.95
 """Share of a limit from which a peak is looked for at the smallest spacing."""
-
-
-class Wheels(NamedTuple):
-    """Size of a rover's wheels and of the rover, and the limits of their forces and speeds."""
-
-    radius: float
-    """Wheel radius [m]."""
-    swing_radius: float
-    """Distance of the outermost wheel from the body origin, seen from above [m]."""
-    friction_limit: float
-    """Safety limit of the friction utilisation, see `force_limit`."""
-    torque_limit: float
-    """Safety limit of the torque saturation."""
-    drop_limit: float
-    """Largest drop of a wheel [m]."""
-    on_servos: bool
-    """True if wheels may be at their limits, as under policy "servo"."""
-    max_rate: float
-    """Largest wheel speed [rad/s]."""
-    steering_rate: float
-    """Largest speed of the steering [rad/s]."""
-    rocker_wheel: int
-    """Index of the right wheel that is on the rocker itself; the others hang on the bogie."""
 
 
 class Crossings(NamedTuple):
@@ -147,37 +124,38 @@ def force_limit(limit, kept_share):
 
 
 @exact_kernel
-def find_jumps(results, poses, joined, wheels, ends):
+def find_jumps(models, results, poses, joined, ends):
     """Find the neighbours between which a contact jumps or a limit may be passed; return how many.
 
     Args:
+        models: (1,) MODEL, or more, of which the first counts.
         results: (n,) RESULT of each waypoint.
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints.
         joined: (n - 1,) True where a waypoint and the next one belong to the same path.
-        wheels: Wheels.
         ends: (>= n, 2) rows of the pairs, written.
     """
-    count = 0
+    model, count = models[0], 0
+    linkage = model.linkage
     for row in range(results.size - 1):
         if not joined[row]:
             continue
-        distance = distance_between(poses[row], poses[row + 1], wheels.swing_radius)
-        if not 0.0 < distance <= LONGEST_STEP * wheels.radius:
+        distance = distance_between(poses[row], poses[row + 1], linkage.swing_radius)
+        if not 0.0 < distance <= LONGEST_STEP * linkage.radius:
             continue
-        if wanted_spacing(results[row], results[row + 1], wheels) < distance:
+        if wanted_spacing(model, results[row], results[row + 1]) < distance:
             ends[count, 0], ends[count, 1] = row, row + 1
             count += 1
     return count
 
 
 @exact_kernel
-def wanted_spacing(here, there, wheels):
+def wanted_spacing(model, here, there):
     """Return the distance [m] up to which two poses tell what is between them; inf for any."""
     if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
         return np.inf
-    if not jumps_between(here, there, wheels):
-        return _finest(here, there, wheels)
-    return (MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING) * wheels.radius
+    if not jumps_between(model, here, there):
+        return _finest(model, here, there)
+    return (MIN_SPACING if _decides(model, here, there) else JUMP_SPACING) * model.linkage.radius
 
 
 @exact_kernel
@@ -205,10 +183,10 @@ def steps_between(here: np.ndarray, there: np.ndarray) -> Floats:
     return steps
 
 
-def distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
+def distances_between(swing_radius: float, poses: np.ndarray) -> Floats:
     """Return the distances (n - 1,) between poses [m], as `distance_between` does."""
     steps = steps_between(poses[:-1], poses[1:])
-    swing = wheels.swing_radius * np.abs(steps[:, 2])
+    swing = swing_radius * np.abs(steps[:, 2])
     return np.maximum(np.hypot(steps[:, 0], steps[:, 1]), swing)
 
 
@@ -220,7 +198,7 @@ def angle_ahead(result, wheel):
 
 
 @exact_kernel
-def jumps_between(here, there, wheels):
+def jumps_between(model, here, there):
     """Return whether a wheel's height or a steep contact jumps between two settled poses."""
     if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
         return False
@@ -229,30 +207,32 @@ def jumps_between(here, there, wheels):
         if max(abs(angle), abs(other)) > STEEP_CONTACT and abs(other - angle) > ANGLE_JUMP:
             return True
         rise = there.wheel_centres[wheel, 2] - here.wheel_centres[wheel, 2]
-        if abs(rise) > HEIGHT_JUMP * wheels.radius:
+        if abs(rise) > HEIGHT_JUMP * model.linkage.radius:
             return True
     return False
 
 
 @exact_kernel
-def _decides(here, there, wheels):
+def _decides(model, here, there):
     """Return whether a verdict may depend on where between two close poses a contact jumps.
 
     It does where a wheel climbs or may fall, or forces are not far from their limits.
     """
-    if wheels.on_servos or max(_largest_use(here, wheels), _largest_use(there, wheels)) > MILD_USE:
+    if model.settings.policy == TorquePolicy.SERVO:
+        return True
+    if max(_largest_use(model, here), _largest_use(model, there)) > MILD_USE:
         return True
     for wheel in range(6):
         rise = there.wheel_centres[wheel, 2] - here.wheel_centres[wheel, 2]
         ahead = -1.0 if there.wheel_speed[wheel] < 0.0 else 1.0
         behind = min(ahead * here.contact_angle[wheel], ahead * there.contact_angle[wheel])
-        if abs(rise) > HEIGHT_JUMP * wheels.radius or behind < -FACE:
+        if abs(rise) > HEIGHT_JUMP * model.linkage.radius or behind < -FACE:
             return True
     return False
 
 
 @exact_kernel
-def _finest(here, there, wheels):
+def _finest(model, here, there):
     """Return the spacing [m] for a stretch in which a limit may be passed, else inf; both settle.
 
     Forces change as contacts turn, and may peak while they do. Where they are beyond at one of the
@@ -266,21 +246,21 @@ def _finest(here, there, wheels):
         ahead = -1.0 if there.wheel_speed[wheel] < 0.0 else 1.0
         passes_edge = passes_edge or (ahead * angle < -FACE) != (ahead * other < -FACE)
     use, other_use = 0.0, 0.0
-    if not wheels.on_servos:
-        use, other_use = _largest_use(here, wheels), _largest_use(there, wheels)
+    if model.settings.policy != TorquePolicy.SERVO:
+        use, other_use = _largest_use(model, here), _largest_use(model, there)
     largest = max(use, other_use)
     rises = largest > LEAST_USE and largest * (1.0 + PEAK * turn) > 1.0
     if min(use, other_use) <= 1.0 and (rises or (largest > NEAR_LIMIT and turn > LEAST_TURN)):
-        return (PEAK_SPACING if largest > AT_LIMIT else EDGE_SPACING) * wheels.radius
-    return EDGE_SPACING * wheels.radius if passes_edge else np.inf
+        return (PEAK_SPACING if largest > AT_LIMIT else EDGE_SPACING) * model.linkage.radius
+    return EDGE_SPACING * model.linkage.radius if passes_edge else np.inf
 
 
 @exact_kernel
-def _largest_use(result, wheels):
+def _largest_use(model, result):
     """Return the largest share of what balances that friction and torque of a wheel use."""
     use, kept = 0.0, result.kept_share
-    most_friction = force_limit(wheels.friction_limit, kept)
-    most_torque = force_limit(wheels.torque_limit, kept)
+    most_friction = force_limit(model.settings.friction_limit, kept)
+    most_torque = force_limit(model.settings.torque_limit, kept)
     for wheel in range(6):
         friction = result.friction_utilisation[wheel] / most_friction
         torque = result.torque_saturation[wheel] / most_torque
@@ -289,21 +269,21 @@ def _largest_use(result, wheels):
 
 
 @exact_kernel
-def add_up(poses, results, wheels, start, sums):
+def add_up(models, poses, results, start, sums):
     """Write distance [m], time [s] and energy [J] into sums (3, n); return those at the last pose.
 
     The rover drives from pose to pose with the motion of the later one. If steering to its angles
     takes longer than that, the drive waits.
 
     Args:
+        models: (1,) MODEL, or more, of which the first counts.
         poses: (n, 3) x, y [m] and yaw [rad].
         results: (n,) RESULT of each pose. Time and energy are NaN where it is not settled, and
             climb and energy between two poses count only if both are settled.
-        wheels: Wheels.
         start: Distance, time and energy at the first pose.
         sums: (3, n), written.
     """
-    distance, time, energy = start
+    model, (distance, time, energy) = models[0], start
     for i in range(results.size):
         result = results[i]
         settled = result.status == PoseStatus.SETTLED
@@ -317,9 +297,9 @@ def add_up(poses, results, wheels, start, sums):
             duration = _drive_time(step, climb, turn, result.motion)
             duration /= 0.5 * (_speed_share(result) + _speed_share(before))
             distance += step
-            time += max(duration, _largest_change(before, result) / wheels.steering_rate)
+            time += max(duration, _largest_change(before, result) / model.linkage.steering_rate)
             if both:
-                energy += _work(before, result, here[2], turn, duration, wheels)
+                energy += _work(model, before, result, here[2], turn, duration)
         sums[0, i] = distance
         sums[1, i] = time if settled else np.nan
         sums[2, i] = energy if settled else np.nan
@@ -355,19 +335,20 @@ def _largest_change(before, after):
 
 
 @exact_kernel
-def _work(before, after, yaw, turn, duration, wheels):
+def _work(model, before, after, yaw, turn, duration):
     """Return the energy [J] of the wheels that drive from a RESULT to the next, both settled.
 
     A motor turns its wheel against the link that carries it, and the links turn, too.
 
     Args:
+        model: MODEL.
         before: RESULT.
         after: RESULT with the motion of the step.
         yaw: Yaw before the step [rad].
         turn: Turn on it [rad].
         duration: Its time [s].
-        wheels: Wheels.
     """
+    linkage, settings = model.linkage, model.settings
     roll, pitch = 0.5 * (before.q[1] + after.q[1]), 0.5 * (before.q[2] + after.q[2])
     about_x = after.q[1] - before.q[1] - turn * np.sin(pitch)
     about_y = (after.q[2] - before.q[2]) * np.cos(roll) + turn * np.sin(roll) * np.cos(pitch)
@@ -384,12 +365,13 @@ def _work(before, after, yaw, turn, duration, wheels):
         level = bulge(turn) * abs(np.cos(heading) * x + np.sin(heading) * y)
         # A wheel that goes down more steeply than 45 degrees falls.
         way = np.hypot(level, climb) if climb > -level else level
-        joints = _link_angle(after, wheel, wheels) - _link_angle(before, wheel, wheels)
+        joints = _link_angle(linkage, after, wheel) - _link_angle(linkage, before, wheel)
         swing = np.cos(steering) * (about_y + joints) - np.sin(steering) * about_x
-        spin = max(way / wheels.radius - direction * swing, 0.0)
+        spin = max(way / linkage.radius - direction * swing, 0.0)
         # A wheel about which the rover turns may slip as good as wholly; servos turn none faster
         # than told.
-        fastest = abs(rate) if wheels.on_servos else wheels.max_rate
+        on_servos = settings.policy == TorquePolicy.SERVO
+        fastest = abs(rate) if on_servos else settings.max_wheel_speed
         most = max(spin, fastest * duration)
         for result in (before, after):
             slip = result.slip_ratio[wheel]
@@ -399,10 +381,10 @@ def _work(before, after, yaw, turn, duration, wheels):
 
 
 @exact_kernel
-def _link_angle(result, wheel, wheels):
+def _link_angle(linkage, result, wheel):
     """Return the angle [rad] of the link that carries a wheel to the body."""
     rocker = result.rocker_angle[wheel // 3]
-    bogie = result.q[4 + wheel // 3] if wheel % 3 != wheels.rocker_wheel else 0.0
+    bogie = result.q[4 + wheel // 3] if linkage.on_bogie[wheel] else 0.0
     return rocker + bogie
 
 
@@ -414,23 +396,24 @@ def _speed_share(result):
 
 
 @exact_kernel
-def find_remaining_jumps(path, order, waypoints, wheels, ends):
+def find_remaining_jumps(models, path, order, waypoints, ends):
     """Find the neighbours on a path whose contacts jump at one place; return their number.
 
     Args:
+        models: (1,) MODEL, or more, of which the first counts.
         path: Crossings of the waypoints, then those in between, no wheel held.
         order: (n,) its rows in path order.
         waypoints: Number of waypoints.
-        wheels: Wheels.
         ends: (>= n, 2) pairs of neighbours, written.
     """
-    count = 0
+    model, count = models[0], 0
+    linkage = model.linkage
     for k in range(1, order.size):
         last, here = order[k - 1], order[k]
-        if not jumps_between(path.results[last], path.results[here], wheels):
+        if not jumps_between(model, path.results[last], path.results[here]):
             continue
-        apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
-        if max(last, here) >= waypoints or 0.0 < apart <= LONGEST_STEP * wheels.radius:
+        apart = distance_between(path.poses[last], path.poses[here], linkage.swing_radius)
+        if max(last, here) >= waypoints or 0.0 < apart <= LONGEST_STEP * linkage.radius:
             ends[count, 0], ends[count, 1] = last, here
             count += 1
     return count

@@ -23,11 +23,12 @@ from rover_physics.prediction.path_kernels import (
     FACE,
     LONGEST_STEP,
     Crossings,
-    Wheels,
     distances_between,
 )
 from rover_physics.prediction.slots import stop_in_slots
 from rover_physics.results.record import select_results
+from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.status import PoseStatus
 
 
@@ -42,18 +43,19 @@ def write_servo_path(
         results: (n,) RESULT of each waypoint, written.
         crossings: Poses between the waypoints; their results are written.
     """
-    course = _Course(model.wheels, poses, results, crossings)
-    _carry_by_momentum(course, float(model.record.linkage.gravity))
+    course = _Course(model.rover, poses, results, crossings)
+    _carry_by_momentum(course)
     stop_in_slots(results, crossings)
-    results["drift"] = _find_drift(course, model.rover.wheelbase)
+    results["drift"] = _find_drift(course)
     _write_lift_heights(course)
 
 
 class _Course:
     """Waypoints and the poses between them, in the order of the path."""
 
-    def __init__(self, wheels: Wheels, poses: Floats, results: Any, crossings: Crossings):
-        self.wheels, self.crossings = wheels, crossings
+    def __init__(self, rover: Rover, poses: Floats, results: Any, crossings: Crossings):
+        self.rover, self.crossings = rover, crossings
+        self.radius, self.swing_radius = rover.wheel.radius, swing_radius(rover)
         self.waypoints, self.results = poses, results
         self.order = crossings.order_among(len(poses))
         self.poses = np.concatenate([poses, crossings.poses])[self.order]
@@ -61,7 +63,7 @@ class _Course:
     @cached_property
     def distances(self) -> Floats:
         """Distances from each pose to the next [m]."""
-        return distances_between(self.wheels, self.poses)
+        return distances_between(self.swing_radius, self.poses)
 
     def values(self, name: str) -> Floats:
         """Return a field of RESULT at all poses."""
@@ -75,13 +77,12 @@ class _Course:
         self.results[name], self.crossings.results[name] = unsorted[:n], unsorted[n:]
 
 
-def _carry_by_momentum(course: _Course, gravity: float) -> None:
+def _carry_by_momentum(course: _Course) -> None:
     """Let the rover roll on where its kinetic energy covers what is missing to drive or to brake.
 
     Where no speed balances, speed share and shares of friction and torque become those with which
     it rolls. A rover that stands, as while its wheels turn or climb, or runs against a face, has
-    no momentum. On the spot, speed and way are those of the outermost wheel. `gravity` is in
-    [m/s^2].
+    no momentum. On the spot, speed and way are those of the outermost wheel.
     """
     deficits = course.values("deficit")
     if not deficits.any():
@@ -89,11 +90,11 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
     share, motion = course.values("speed_share"), course.values("motion")
     ahead = course.values("contact_angle") * np.sign(course.values("wheel_speed"))
     speed = np.hypot(motion[:, 0], motion[:, 1])
-    speed = np.where(speed > 0.0, speed, course.wheels.swing_radius * np.abs(motion[:, 2]))
-    nominal = speed**2 / (2.0 * gravity)
+    speed = np.where(speed > 0.0, speed, course.swing_radius * np.abs(motion[:, 2]))
+    nominal = speed**2 / (2.0 * course.rover.gravity)
     distances = np.append(0.0, course.distances)
     stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
-    head, carried, most = 0.0, np.zeros(len(deficits)), RUNAWAY * course.wheels.radius
+    head, carried, most = 0.0, np.zeros(len(deficits)), RUNAWAY * course.radius
     for k in np.flatnonzero(deficits).tolist():
         if k > 0 and deficits[k - 1] == 0.0:
             head = 0.0 if stands[k - 1] else share[k - 1] ** 2 * nominal[k - 1]
@@ -172,19 +173,18 @@ def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats
     return np.asarray(np.cumsum(extra, axis=0))
 
 
-def _find_drift(course: _Course, window: float) -> Floats:
+def _find_drift(course: _Course) -> Floats:
     """Return the drift (n, 2) at waypoints: the turn [rad] and the slide [m] that built up.
 
-    Args:
-        course: The path. In long turns, the largest drift of a waypoint and of the poses on the
-            way to it counts; elsewhere waypoints are enough.
-        window: Way before each waypoint within which drift counts [m], of the body or, where it
-            turns, of its outermost wheel.
+    They do within a wheelbase before each waypoint, of the body or, where it turns, of its
+    outermost wheel. In long turns, the largest drift of a waypoint and of the poses on the way to
+    it counts; elsewhere waypoints are enough.
     """
-    wheels, poses, crossings = course.wheels, course.waypoints, course.crossings
-    long_steps = np.append(False, distances_between(wheels, poses) > LONGEST_STEP * wheels.radius)
+    poses, crossings = course.waypoints, course.crossings
+    steps = distances_between(course.swing_radius, poses)
+    long_steps = np.append(False, steps > LONGEST_STEP * course.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
-    course = _Course(wheels, poses, course.results, turns)
+    course = _Course(course.rover, poses, course.results, turns)
     share, deviation = course.values("speed_share"), course.values("deviation")
     drives = (course.values("status") == PoseStatus.SETTLED) & (share > 0.0)
     rate = np.where(drives[:, None], deviation, 0.0)
@@ -195,7 +195,7 @@ def _find_drift(course: _Course, window: float) -> Floats:
     sums = np.zeros(rate.shape)
     sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * course.distances[:, None], axis=0)
     place = np.append(0.0, np.cumsum(course.distances))
-    built_up = sums - sums[np.searchsorted(place, place - window)]
+    built_up = sums - sums[np.searchsorted(place, place - course.rover.wheelbase)]
     n = len(poses)
     owner = np.append(np.arange(n), turns.waypoint)[course.order]
     found = np.column_stack([np.abs(built_up[:, 2]), np.hypot(built_up[:, 0], built_up[:, 1])])

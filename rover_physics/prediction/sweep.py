@@ -22,8 +22,7 @@ from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import climb_faces, find_crossings
-from rover_physics.prediction.drops import Drops, find_drops
-from rover_physics.prediction.failures import find_suspects
+from rover_physics.prediction.drops import Drops, find_drops, find_suspects
 from rover_physics.prediction.halving import AtFailure
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
@@ -44,7 +43,8 @@ from rover_physics.results.record import (
     select_results,
     unwritten_results,
 )
-from rover_physics.results.uses import RoverLimits, find_uses, readable
+from rover_physics.results.uses import RoverLimits, find_uses
+from rover_physics.rover.steering_joints import swing_radius
 
 FIRST_BLOCK = 32
 """Number of waypoints of a path that are evaluated first."""
@@ -152,8 +152,8 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
 def _find_restart(model: PackedModel, poses: np.ndarray, drops: Drops) -> int:
     """Return the last waypoint of a part from which what is not decided follows; 0 for none."""
     starts = np.flatnonzero(drops.starts)
-    if model.wheels.on_servos:
-        way = np.append(0.0, np.cumsum(distances_between(model.wheels, poses)))
+    if model.on_servos:
+        way = np.append(0.0, np.cumsum(distances_between(swing_radius(model.rover), poses)))
         last = way[min(drops.decided, len(way) - 1)]
         starts = starts[way[starts] <= last - model.rover.wheelbase]
     return int(starts[-1]) if len(starts) else 0
@@ -208,7 +208,7 @@ def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> 
     path = Crossings(np.arange(float(n)), np.arange(n) + 1, none_held(n), poses, results)
     path, order = join_crossings([path, crossings]), crossings.order_among(n)
     pairs = np.empty((len(order), 2), np.int64)
-    count = find_remaining_jumps(path.views, order, n, model.wheels, pairs)
+    count = find_remaining_jumps(model.records, path.views, order, n, pairs)
     if count:
         climbs = climb_faces(model, path, pairs[:count])
         crossings = join_crossings([crossings, climbs]).in_order()
@@ -269,7 +269,8 @@ class _StartedPath:
             self._suspicious |= bool(self._find_suspects(crossings.results)[0] >= 0)
 
     def _find_suspects(self, results: Any) -> tuple[int, int]:
-        found = find_suspects(*readable(results), self._model.limits.records, self._model.wheels)
+        records, limits = self._model.records, self._model.limits.records
+        found = find_suspects(records, limits, view_read_only(results))
         return found[0], found[1]
 
     def look_for_failure(self) -> None:
@@ -284,8 +285,8 @@ class _StartedPath:
         if not (complete or self._suspicious):
             if not len(crossings.place):
                 return
-            drops = find_drops(self._model.wheels, here, results, crossings)
-            if not drops.heights.max() > self._model.wheels.drop_limit:
+            drops = find_drops(self._model.records, here, results, crossings)
+            if not drops.heights.max() > self._model.rover.limits.wheel_drop:
                 return
         swept, drops = make_prediction(self._model, here, results, crossings)
         failure = find_first_failure(self._model.limits, swept.prediction)
@@ -356,9 +357,8 @@ def make_prediction(
     What the path decides is written into the results. Distance, time and energy at the first pose
     are `start`.
     """
-    wheels = model.wheels
-    drops = find_drops(wheels, poses, results, crossings)
-    if wheels.on_servos:
+    drops = find_drops(model.records, poses, results, crossings)
+    if model.on_servos:
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
         write_servo_path(model, poses, results, crossings)
@@ -369,7 +369,7 @@ def make_prediction(
     results["falling"], between["falling"] = drops.at_waypoints, drops.between
     _write_sums(model, crossings.poses, between, NO_SUMS)
     _write_sums(model, poses, results, start)
-    if wheels.on_servos:
+    if model.on_servos:
         time, energy = climb_costs(poses, results, crossings).T
         results["time"] += time
         results["energy"] += energy
@@ -404,18 +404,18 @@ def _sum_up(
     model: PackedModel, poses: np.ndarray, results: Any, crossings: Crossings, start: Sums
 ) -> Sums:
     """Return distance [m], time [s] and energy [J] at the last pose from those at the first."""
-    if model.wheels.on_servos:
+    if model.on_servos:
         before = crossings.select(crossings.waypoint < len(poses))
         time, energy = climb_costs(poses, results, before)[-1]
         start = (start[0], start[1] + time, start[2] + energy)
     path, sums = (view_read_only(poses), view_read_only(results)), np.empty((3, len(poses)))
-    return add_up(*path, model.wheels, start, sums)
+    return add_up(model.records, *path, start, sums)
 
 
 def _write_sums(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> None:
     """Write distance, time and energy at poses (n, 3) into their RESULTs."""
     sums = np.empty((3, len(poses)))
-    add_up(view_read_only(poses), view_read_only(results), model.wheels, start, sums)
+    add_up(model.records, view_read_only(poses), view_read_only(results), start, sums)
     results["distance"], results["time"], results["energy"] = sums
 
 

@@ -11,6 +11,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numba import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from rover_physics.limits import table
@@ -28,7 +30,6 @@ ABOVE = 1.0 + 2.0**-23
 MOST, LEAST, RANGE, SHARE = (int(sense) for sense in Sense)
 FLAGS = ("needs_forces", "exempt_on_edge", "keeps_margin", "is_risk", "may_be_unknown")
 """Fields of a `Limit` that a LIMIT has, too."""
-KEPT, ROLLING_OFF_EDGE = find_column("kept_share")[0], find_column("falling")[0]
 
 LIMIT = record_type(
     ("column", np.int64),  # first of the values in `numbers_of` a result
@@ -136,7 +137,7 @@ def find_uses(limits: RoverLimits, results: Any) -> Uses:
     """Return the uses of limits at RESULTs (n,)."""
     shape = len(results), len(limits)
     use, element = np.empty(shape), np.empty(shape, np.int64)
-    fill_uses(*readable(results), limits.records, use, element)
+    fill_uses(view_read_only(results), limits.records, use, element)
     return Uses(limits, use, element)
 
 
@@ -153,51 +154,55 @@ def find_codes(limits: RoverLimits, results: Any) -> list[str]:
     return list(codes)
 
 
-def readable(results: Any) -> tuple[Any, np.ndarray]:
-    """Return RESULTs (n,) as kernels read them: read-only, and as numbers (n, RESULT_COLUMNS)."""
-    return view_read_only(results), view_read_only(numbers_of(results))
+@intrinsic
+def number_at(_context: Any, result: Any, _column: Any) -> Any:
+    """Return the number in a column of a RESULT, as `numbers_of` has it."""
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        kind = context.get_value_type(types.float64).as_pointer()
+        return builder.load(builder.gep(builder.bitcast(arguments[0], kind), [arguments[1]]))
+
+    return types.float64(result, types.int64), generate
 
 
 @exact_kernel
-def fill_uses(results, numbers, limits, use, element):
-    """Write use and deciding element (n, k) of LIMITs (k,) at RESULTs (n,).
-
-    `numbers` (n, RESULT_COLUMNS) are the same results.
-    """
+def fill_uses(results, limits, use, element):
+    """Write use and deciding element (n, k) of LIMITs (k,) at RESULTs (n,)."""
     for row in range(results.size):
-        rolling_off_edge = is_rolling_off_edge(numbers, row)
+        result = results[row]
+        rolling_off_edge = is_rolling_off_edge(result)
         for k in range(limits.size):
-            if results[row].status == PoseStatus.SETTLED:
-                use[row, k], element[row, k] = find_use(numbers, row, limits[k], rolling_off_edge)
+            if result.status == PoseStatus.SETTLED:
+                use[row, k], element[row, k] = find_use(result, limits[k], rolling_off_edge)
             else:
                 use[row, k], element[row, k] = np.inf, -1
 
 
 @exact_kernel
-def is_rolling_off_edge(numbers, row):
-    """Return whether a wheel rolls off an edge at a row of results."""
+def is_rolling_off_edge(result):
+    """Return whether a wheel rolls off an edge."""
     rolling_off_edge = False
     for wheel in range(6):
-        rolling_off_edge = rolling_off_edge or numbers[row, ROLLING_OFF_EDGE + wheel] > 0.0
+        rolling_off_edge = rolling_off_edge or result.falling[wheel] > 0.0
     return rolling_off_edge
 
 
 @exact_kernel
-def find_use(numbers, row, limit, rolling_off_edge):
-    """Return the use of a LIMIT at a settled row of results, and the index of what decides it."""
+def find_use(result, limit, rolling_off_edge):
+    """Return the use of a LIMIT at a settled RESULT, and the index of what decides it."""
     if rolling_off_edge and limit.exempt_on_edge:
         return np.nan, -1
-    if limit.if_column >= 0 and numbers[row, limit.if_column] != limit.if_value:
+    if limit.if_column >= 0 and number_at(result, limit.if_column) != limit.if_value:
         return np.nan, -1
     mean = 0.0
     if limit.sense == SHARE:
         for k in range(limit.count):
-            mean += numbers[row, limit.column + k]
+            mean += number_at(result, limit.column + k)
         mean = max(mean / limit.count, TOLERANCE)
-    most = limit.most * numbers[row, KEPT] if limit.keeps_margin else limit.most
+    most = limit.most * result.kept_share if limit.keeps_margin else limit.most
     worst, decides = -1.0, -1
     for k in range(limit.count):
-        value = numbers[row, limit.column + k]
+        value = number_at(result, limit.column + k)
         if value != value:
             return (np.nan if limit.may_be_unknown else np.inf), k
         use = _use_of(value, limit.least, most, mean, limit.sense)
@@ -225,14 +230,14 @@ def _use_of(value, least, most, mean, sense):
 
 
 @exact_kernel
-def find_broken(numbers, row, limits):
-    """Return the index of the first broken limit of a settled row, -1 if it passes.
+def find_broken(result, limits):
+    """Return the index of the first broken limit of a settled RESULT, -1 if it passes.
 
     Also return that of the first which would be broken if a wheel rolled off an edge, too.
     """
-    first, in_any_case, rolling_off_edge = -1, -1, is_rolling_off_edge(numbers, row)
+    first, in_any_case, rolling_off_edge = -1, -1, is_rolling_off_edge(result)
     for k in range(limits.size):
-        if find_use(numbers, row, limits[k], rolling_off_edge)[0] > 1.0:
+        if find_use(result, limits[k], rolling_off_edge)[0] > 1.0:
             if first < 0:
                 first = k
             if in_any_case < 0 and not limits[k].exempt_on_edge:
@@ -241,12 +246,12 @@ def find_broken(numbers, row, limits):
 
 
 @exact_kernel
-def find_risk(numbers, row, limits):
-    """Return the largest use of the limits that count as risk at a settled row of results."""
-    risk, rolling_off_edge = 0.0, is_rolling_off_edge(numbers, row)
+def find_risk(result, limits):
+    """Return the largest use of the limits that count as risk at a settled RESULT."""
+    risk, rolling_off_edge = 0.0, is_rolling_off_edge(result)
     for k in range(limits.size):
         if limits[k].is_risk:
-            use = find_use(numbers, row, limits[k], rolling_off_edge)[0]
+            use = find_use(result, limits[k], rolling_off_edge)[0]
             if use > risk:
                 risk = use
     return risk

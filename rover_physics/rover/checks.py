@@ -11,6 +11,7 @@ from rover_physics.files.validation import refuse
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEEL_POSITIONS
 from rover_physics.numerics import plausible as known
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import MAX_DEVIATION
 
 _LEVEL_TOLERANCE = 1e-3  # m, largest height difference of level wheels
 
@@ -107,8 +108,10 @@ def _of_other_parts(rover: Rover) -> Iterator[Demand]:
 def _of_balance(rover: Rover) -> Iterator[Demand]:
     """Yield that the rover stands on flat ground, with its centre of mass between the wheels."""
     wheels, masses = rover.suspension.wheels, rover.masses
-    mass, com = masses.body.mass, masses.body.com
+    mass, com, deviation = masses.body.mass, masses.body.com, rover.uncertainty.mass
     yield mass > 0.0, "masses.body.mass", mass, "a number above 0 in kg"
+    light = f"at most {MAX_DEVIATION:g} of masses.body.mass, {MAX_DEVIATION * mass:g} kg"
+    yield deviation <= MAX_DEVIATION * mass, "uncertainty.mass", deviation, light
     moment = mass * com[0]
     for part in (masses.rocker, masses.bogie):
         moment += 2.0 * part.mass * part.com[0]

@@ -146,6 +146,13 @@ def to_map(placement, point, out, row):
 
 
 @kernel
+def pitch_axis(R):
+    """Return the horizontal axis (x, y, z), across the heading, about which pitch turns a body."""
+    length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
+    return -R[1, 0] / length, R[0, 0] / length, 0.0
+
+
+@kernel
 def rocker_sign(side):
     """Return the sign of the rocker angle on a side; the differential mirrors the rockers."""
     return 1.0 if side == 0 else -1.0

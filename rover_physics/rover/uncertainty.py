@@ -9,8 +9,9 @@ from rover_physics.numerics.plausible import MAX_MASS
 
 ACCEPTED_CHANCE = 0.05
 """Largest chance of failure of a traversable path if none is told: one drive of twenty."""
-Relative = Annotated[float, number("", least=0.0, most=0.35)]
-"""A standard deviation over the value; three of them leave it above 0."""
+MAX_DEVIATION = 0.35
+"""Largest standard deviation over the value: about three of them leave it above 0."""
+Relative = Annotated[float, number("", least=0.0, most=MAX_DEVIATION)]
 Metres = Annotated[float, number("m", least=0.0, most=1.0)]
 
 

@@ -22,8 +22,7 @@ from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.crossing import find_crossings, find_turns, list_jumps, turn_wheels
-from rover_physics.prediction.drops import MIN_ANGLE, find_drops
-from rover_physics.prediction.failures import find_suspects, mark_failures
+from rover_physics.prediction.drops import MIN_ANGLE, find_drops, find_suspects, mark_failures
 from rover_physics.prediction.halving import AtFailure
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
@@ -34,8 +33,9 @@ from rover_physics.prediction.sweep import check_poses, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import place_results, select_results, unwritten_results
-from rover_physics.results.uses import find_codes, find_risk, find_uses, limits_of, readable
+from rover_physics.results.uses import find_codes, find_risk, find_uses, limits_of
 from rover_physics.rover.model import Rover
+from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_paths
 
@@ -156,8 +156,8 @@ class _Sweep:
     def _close_failures(self, results: Any, piece: np.ndarray) -> dict[int, str]:
         """Return the codes of pieces with RESULTs (n,) that fail in any case, by index (n,)."""
         fails = np.zeros(len(piece), bool)
-        look = self._model.limits.records, self._model.wheels
-        mark_failures(*readable(results), *look, fails)
+        records, limits = self._model.records, self._model.limits.records
+        mark_failures(records, limits, view_read_only(results), fails)
         if not fails.any():
             return {}
         failed, first = np.unique(piece[fails], return_index=True)
@@ -183,15 +183,13 @@ class _Sweep:
         owner = indices[np.searchsorted(ends, between.waypoint, side="right")]
         codes = self._close_failures(between.results, owner)
         found, sums = np.full((len(indices), 3), np.nan), np.empty((3, len(poses)))
-        path = view_read_only(poses), readable(results), ends
-        inside = readable(between.results), np.searchsorted(between.waypoint, ends)
-        linkage = self._model.record.linkage
-        look = self._model.limits.records, self._model.wheels, float(linkage.length)
-        sum_up_pieces(path, inside, look, sums, found)
+        path = view_read_only(poses), view_read_only(results), ends
+        inside = view_read_only(between.results), np.searchsorted(between.waypoint, ends)
+        sum_up_pieces(self._model.records, self._model.limits.records, *path, *inside, sums, found)
         found[unsure, 0] = np.nan
         passes = found[:, 0] == found[:, 0]
         self._is_open[indices[passes]] = False
-        if not self._model.wheels.on_servos:
+        if not self._model.on_servos:
             codes |= self._find_broken(results, np.repeat(indices, self._counts[indices]))
             codes |= self._find_broken(between.results, owner)
         verdicts = {k: PieceVerdict(code) for k, code in codes.items()}
@@ -219,7 +217,7 @@ class _Sweep:
         waypoints may take time, too, so that only turns of wheels are looked at here.
         """
         model, joined = self._model, joined_paths(ends)
-        if model.wheels.on_servos:
+        if model.on_servos:
             jumps = list_jumps(model, poses, results, joined)
             far = find_turns(model, poses, results, joined)
             unsure = np.searchsorted(ends, np.append(jumps[:, 0], far[:, 0]), side="right")
@@ -231,7 +229,7 @@ class _Sweep:
         for k in np.unique(np.searchsorted(ends, rows, side="right")).tolist():
             piece = slice(ends[k - 1] if k else 0, ends[k])
             inside = between.between(piece.start, piece.stop)
-            drops = find_drops(model.wheels, poses[piece], results[piece], inside)
+            drops = find_drops(model.records, poses[piece], results[piece], inside)
             results["wheel_drop"][piece] = drops.heights
             results["falling"][piece] = drops.at_waypoints
             inside.results["falling"] = drops.between
@@ -240,41 +238,42 @@ class _Sweep:
 
 
 @exact_kernel
-def sum_up_pieces(path, between, look, sums, found):
+def sum_up_pieces(models, limits, poses, results, ends, others, other_ends, sums, found):
     """Write time, energy and exposure of the pieces that pass without a closer look.
 
     Args:
-        path: (n, 3) poses of all pieces, their results as of `readable`, and (k,) the rows where
-            pieces end.
-        between: Results between the waypoints, and (k,) the rows where those of the pieces end.
-        look: (k,) LIMIT, Wheels and wheelbase [m].
+        models: (1,) MODEL, or more, of which the first counts.
+        limits: (k,) LIMIT.
+        poses: (n, 3) poses of all pieces.
+        results: (n,) RESULT of each.
+        ends: (k,) the rows where pieces end.
+        others: (m,) RESULTs between the waypoints.
+        other_ends: (k,) the rows where those of the pieces end.
         sums: (3, n) work space.
         found: (k, 3) time [s], energy [J] and exposure [s], written for pieces that pass.
     """
-    (poses, (results, numbers), ends), ((others, other_numbers), other_ends) = path, between
-    limits, wheels, wheelbase = look
     first, first_other = 0, 0
     for k in range(ends.size):
         piece, inside = slice(first, ends[k]), slice(first_other, other_ends[k])
         first, first_other = ends[k], other_ends[k]
         if not (
-            _is_easy(results[piece], numbers[piece], limits, wheels)
-            and _is_easy(others[inside], other_numbers[inside], limits, wheels)
-            and _keeps_to_path(poses[piece], results[piece], wheels.swing_radius, wheelbase)
+            _is_easy(models, limits, results[piece])
+            and _is_easy(models, limits, others[inside])
+            and _keeps_to_path(models[0].linkage, poses[piece], results[piece])
         ):
             continue
         start = (0.0, 0.0, 0.0)
-        last = add_up(poses[piece], results[piece], wheels, start, sums[:, piece])
+        last = add_up(models, poses[piece], results[piece], start, sums[:, piece])
         found[k, 0], found[k, 1] = last[1], last[2]
-        found[k, 2] = add_exposure(numbers[piece], sums[1, piece], limits)
+        found[k, 2] = add_exposure(limits, results[piece], sums[1, piece])
 
 
 @exact_kernel
-def add_exposure(numbers, time, limits):
-    """Return the exposure [s] as `find_exposure`, of results as numbers at times (n,) [s]."""
+def add_exposure(limits, results, time):
+    """Return the exposure [s] as `find_exposure`, of RESULTs (n,) at times (n,) [s]."""
     exposure, before = 0.0, 0.0
-    for row in range(numbers.shape[0]):
-        excess = (find_risk(numbers, row, limits) - SAFE) / (1.0 - SAFE)
+    for row in range(results.size):
+        excess = (find_risk(results[row], limits) - SAFE) / (1.0 - SAFE)
         here = min(max(excess, 0.0), 1.0) ** 2
         if row > 0:
             exposure += 0.5 * (before + here) * (time[row] - time[row - 1])
@@ -283,11 +282,11 @@ def add_exposure(numbers, time, limits):
 
 
 @exact_kernel
-def _is_easy(results, numbers, limits, wheels):
+def _is_easy(models, limits, results):
     """Return whether no RESULT breaks a limit and, on servos, no wheel may fall or lift."""
-    if find_suspects(results, numbers, limits, wheels)[0] >= 0:
+    if find_suspects(models, limits, results)[0] >= 0:
         return False
-    if not wheels.on_servos:
+    if models[0].settings.policy != TorquePolicy.SERVO:
         return True
     for row in range(results.size):
         for wheel in range(6):
@@ -298,15 +297,15 @@ def _is_easy(results, numbers, limits, wheels):
 
 
 @exact_kernel
-def _keeps_to_path(poses, results, swing_radius, wheelbase):
+def _keeps_to_path(linkage, poses, results):
     """Return whether the deviations from the path stay small, whatever their directions."""
     turn, slide = 0.0, 0.0
     for row in range(1, results.size):
-        distance = distance_between(poses[row - 1], poses[row], swing_radius)
+        distance = distance_between(poses[row - 1], poses[row], linkage.swing_radius)
         for i in range(row - 1, row + 1):
             x, y, rate = results[i].deviation[0], results[i].deviation[1], results[i].deviation[2]
             if x != 0.0 or y != 0.0 or rate != 0.0:
                 share = 0.5 * distance / results[i].speed_share
                 turn += share * abs(rate)
                 slide += share * np.hypot(x, y)
-    return turn <= MAX_TURN_OFF and slide <= MAX_SLIDE * wheelbase
+    return turn <= MAX_TURN_OFF and slide <= MAX_SLIDE * linkage.length

@@ -28,7 +28,7 @@ from rover_physics.prediction.evaluation import (
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.results.record import numbers_of, unwritten_results
+from rover_physics.results.record import unwritten_results
 from rover_physics.results.uses import RoverLimits, find_broken
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
@@ -137,7 +137,7 @@ def _find_classes(
     ]
     models = np.array([model.record for model in packed], MODEL)
     orders = [_without_forces_first(model.limits) for model in packed]
-    limits = view_read_only(np.concatenate(orders)), np.cumsum([0, *map(len, orders)])
+    limits, starts = view_read_only(np.concatenate(orders)), np.cumsum([0, *map(len, orders)])
     ranks = np.array([TORQUE_POLICIES.index(policy) for policy in policies])
 
     def parts(works: NDArray[np.void]) -> Iterator[Callable[[], None]]:
@@ -146,9 +146,8 @@ def _find_classes(
             check_interruption()
             part, own = slice(first, first + PART), k % len(works)
             space = works[own : own + 1], results[own : own + 1]
-            spaces = *space, numbers_of(space[1])
-            asked = models, limits, ranks
-            yield partial(classify_all, asked, (poses[part], AHEAD), spaces, classes[part])
+            asked = models, limits, starts, ranks, poses[part], AHEAD
+            yield partial(classify_all, *asked, *space, classes[part])
 
     with limit_threads(packed[0].relative_cost(len(poses))) as threads:
         run_in_turn(parts(new_works(threads, CHUNK * CALLS_IN_WORK * threads)), threads)
@@ -161,20 +160,21 @@ def _without_forces_first(limits: RoverLimits) -> NDArray[np.void]:
 
 
 @kernel
-def classify_all(asked, places, spaces, classes):
+def classify_all(models, limits, starts, ranks, poses, motions, works, results, classes):
     """Find the classes of poses; each pose is settled once only.
 
     Args:
-        asked: (k,) MODELs of one rover on one ground; the LIMITs of all, those without forces
-            first, and (k + 1,) where those of each begin; (k,) the class of a pose that passes.
-        places: (n, 3) x, y [m] and yaw [rad] of the body origin, and their motions, as for
-            `evaluate`.
-        spaces: (1,) WORK, (1,) RESULT and this result as numbers.
+        models: (k,) MODELs of one rover on one ground.
+        limits: The LIMITs of all, those without forces first.
+        starts: (k + 1,) where those of each begin.
+        ranks: (k,) the class of a pose that passes.
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin.
+        motions: Their motions, as for `evaluate`.
+        works: (1,) WORK.
+        results: (1,) RESULT, work space.
         classes: (n,) written.
     """
-    (models, (limits, starts), ranks), (poses, motions) = asked, places
-    works, results, numbers = spaces
-    work = works[0]
+    work, result = works[0], results[0]
     for i in range(poses.shape[0]):
         set_pose(models[0], poses, motions, i, work)
         status = stand(models[0], work)
@@ -184,11 +184,11 @@ def classify_all(asked, places, spaces, classes):
         if status != PoseStatus.SETTLED:
             continue
         for k in range(models.size):
-            evaluate_stance(models[k], work, status, results[0])
-            if results[0].status != PoseStatus.SETTLED:
+            evaluate_stance(models[k], work, status, result)
+            if result.status != PoseStatus.SETTLED:
                 continue
             own = limits[starts[k] : starts[k + 1]]
-            broken = find_broken(numbers, 0, own)[0]
+            broken = find_broken(result, own)[0]
             if broken < 0:
                 classes[i] = ranks[k]
                 break

@@ -25,7 +25,7 @@ from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.results.record import new_results, numbers_of
+from rover_physics.results.record import new_results
 from rover_physics.results.uses import find_uses
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
@@ -103,12 +103,11 @@ def evaluate_in_turn(
 ) -> Iterator[tuple[Any, Any]]:
     """Yield RESULT (1,) and WORK of each pose and motion; the next pose overwrites both."""
     results, works = new_results(1), new_works(1, 1)
-    written = results, numbers_of(results)
     for i in range(len(poses)):
         places = poses[i : i + 1], motions[i : i + 1], NONE_HELD
         # The kernel of sweeps, for one pose: a kernel of its own would compile the model again.
-        sweep = model.records[None], model.limits.records, places, NO_STRETCHES, works, written
-        evaluate_poses(*sweep, (0, 1))
+        sweep = model.records[None], model.limits.records, *places, NO_STRETCHES, works, results
+        evaluate_poses(*sweep, 0, 1)
         yield results, works[0]
 
 

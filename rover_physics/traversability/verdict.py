@@ -208,10 +208,10 @@ def refuse_chance(verdict: Verdict, chance: FailureChance, accepted: float) -> V
         return known
     worst, codes, reasons = int(at.argmax()), list(verdict.codes), list(verdict.reasons)
     codes[worst], least = CHANCE, "" if chance.is_whole else "at least "
+    cause = f"by the limit of {chance.limit}" if chance.limit else "where it does not settle"
     reasons[worst] = (
         f"the path passes as told, but fails with a chance of {least}{path:.2f} by what is "
-        f"uncertain, accepted {accepted:g}: most often here, {at[worst]:.2f}, by the limit of "
-        f"{chance.limit}"
+        f"uncertain, accepted {accepted:g}: most often here, {at[worst]:.2f}, {cause}"
     )
     return with_refusals(known, codes, reasons)
 

@@ -105,19 +105,17 @@ def grow_within(case: Case, check: Callable[[], object]) -> Iterator[Advice]:
         QuestionStoppedError: Not even the path itself was judged; it says STOPPED.
         RoverError: The model refuses the path or an option.
     """
-    growing, has_begun = grow_advice(case), False
-    while True:
-        try:
+    growing, advice = grow_advice(case), None
+    try:
+        while True:
             with interruptible(check):
-                advice = next(growing, None)
-        except QuestionStoppedError as error:
-            if has_begun:
-                return
-            raise QuestionStoppedError(error.code, STOPPED) from error
+                advice = next(growing)
+            yield advice
+    except StopIteration:
+        return
+    except QuestionStoppedError as error:
         if advice is None:
-            return
-        has_begun = True
-        yield advice
+            raise QuestionStoppedError(error.code, STOPPED) from error
 
 
 def refuse(code: str, reason: str) -> dict[str, Any]:

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.limits.table import CHANCE, Sense
+from rover_physics.limits.table import CHANCE, TRAPPED, Sense
 from rover_physics.names import SERVO, WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.sweep import check_poses, predict_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import RoverLimits, find_uses, limits_of
@@ -32,6 +30,8 @@ MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
 EDGE = 2.0
 """Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
+FIRST_ROWS = 2
+"""Rows of a piece of path that tell nothing of the path."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
 """Settings of the search of a path around."""
 
@@ -85,33 +85,6 @@ class Case:
         )
         path = self.site.refuse_ground(Candidate(self.poses, *judged))
         return JudgedCase(self, path.prediction, path.verdict)
-
-    def predict(self) -> PathPrediction:
-        """Predict all of the path, also beyond its first failure."""
-        model = pack_model(self.rover, self.terrain, self.options)
-        return predict_paths(model, [check_poses(self.poses)], stop_at_failure=False)[0].prediction
-
-    def fails_at(self, place: int, rows: slice, by_chance: bool) -> bool:
-        """Return whether a piece of the path shows that a waypoint in it, or one before it, fails.
-
-        Its first row has another motion than in the path, and wheels behind the place may fall in
-        ways that the piece does not show.
-        """
-        accepted = self.site.options.accepted_chance
-        (_, verdict), *_ = judge_paths(
-            self.rover,
-            self.terrain,
-            [self.poses[rows]],
-            self.options,
-            sigmas=self.site.options.map_sigmas,
-            stop_at_failure=True,
-            check_entrapment=False,
-            accepted_chance=accepted if by_chance else None,
-        )
-        row = verdict.first_failure
-        if verdict.code == CHANCE and verdict.failure_chance_at[row] <= accepted:
-            return False
-        return (0 if rows.start == 0 else 1) <= row <= place - rows.start
 
 
 def case_of(site: Site, poses: Floats) -> Case:
@@ -190,30 +163,29 @@ class JudgedCase:
     @property
     def time(self) -> float:
         """Time of the path [s], as if the rover could drive on where it fails."""
-        total = self._sum_up("time")
-        length = float(self.distance[-1])
-        return length / self.case.rover.nominal_speed if total is None else total
+        return self._sum_up("time", float(self.distance[-1]) / self.case.rover.nominal_speed)
 
     @property
     def energy(self) -> float:
         """Energy of the path [J] in the same way; 0 if none of it is known."""
-        return self._sum_up("energy") or 0.0
+        return self._sum_up("energy", 0.0)
 
-    def _sum_up(self, name: str) -> float | None:
-        """Return the sum at the end of the path: where it is not known, as before by distance."""
+    def _sum_up(self, name: str, usual: float) -> float:
+        """Return the sum at the end of the path; if unknown, as before by distance, or `usual`."""
         values, distance = getattr(self._whole, name), self.distance
         if np.isfinite(values[-1]):
             return float(values[-1])
         known = np.flatnonzero(np.isfinite(values) & (distance > 0.0))
         if not known.size:
-            return None
+            return usual
         return float(values[known[-1]] * distance[-1] / distance[known[-1]])
 
     @cached_property
     def _whole(self) -> PathPrediction:
         """The prediction of all of the path, on ground that holds if the wheels slip on this."""
         slips = self.verdict.code == "friction"
-        return (self.case.change(friction=MOST_FRICTION) if slips else self.case).predict()
+        case = self.case.change(friction=MOST_FRICTION) if slips else self.case
+        return judge_path(case.rover, case.terrain, case.poses, case.options, sigmas=0)[0]
 
     @property
     def place_on_ground(self) -> tuple[float, float]:
@@ -238,8 +210,30 @@ class JudgedCase:
             return None  # an end is not on the map
         return None if found.path is None else found.path.poses
 
-    def rows_around(self, place: int) -> slice:
-        """Return the rows of the path that show whether a waypoint fails by itself."""
+    def fails_alike(self, case: Case) -> bool:
+        """Return whether a piece of path around this failure shows that another case fails, too.
+
+        The rows of its path are near those of this one. The first rows of the piece have another
+        motion than in the path, and wheels behind the failure may fall in ways that the piece does
+        not show. Nor does it show whether the rover is trapped.
+        """
+        if self.verdict.code == TRAPPED:
+            return False
         near = EDGE * self.case.rover.wheel.radius * np.array([-1.0, 1.0])
-        first, last = np.searchsorted(self.distance, self.distance[place] + near)
-        return slice(max(0, min(int(first), place - 1)), int(last) + 1)
+        first, last = np.searchsorted(self.distance, self.distance[self.place] + near).tolist()
+        begin = max(0, min(first, self.place - FIRST_ROWS))
+        accepted = case.site.options.accepted_chance
+        (_, verdict), *_ = judge_paths(
+            case.rover,
+            case.terrain,
+            [case.poses[begin : last + 1]],
+            case.options,
+            sigmas=case.site.options.map_sigmas,
+            stop_at_failure=True,
+            check_entrapment=False,
+            accepted_chance=accepted if self.verdict.code == CHANCE else None,
+        )
+        row = verdict.first_failure
+        if verdict.code == CHANCE and verdict.failure_chance_at[row] <= accepted:
+            return False
+        return (FIRST_ROWS if begin else 0) <= row <= self.place - begin

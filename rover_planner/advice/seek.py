@@ -3,18 +3,16 @@
 
 One lever comes before two, two before three. A lever with a range is tried in steps from its value
 now to both ends; between the first step that passes and the one before, the least value is found
-by bisection. Poses that an earlier trial failed at come first: who fails there needs no sweep.
+by bisection. Who fails where the refused path does needs no sweep of the whole path.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
 
 from rover_physics.errors import RoverError
-from rover_physics.limits.table import CHANCE, TRAPPED
-from rover_planner.advice.case import Case, JudgedCase
+from rover_planner.advice.case import JudgedCase
 from rover_planner.advice.levers import LEVERS, Choice, Lever, Span
 from rover_planner.advice.remedy import Remedy, SetLever
 
@@ -23,19 +21,6 @@ TOLERANCE = 0.02
 COARSE, FINE = (tuple((k + 1) / count for k in range(count)) for count in (10, 50))
 ROUNDS = ((1, COARSE), (1, FINE), (2, (0.3, 0.6, 1.0)), (3, (0.5, 1.0)))
 """Number of levers, and steps [share of the range] of each of them, as they are tried."""
-MOST_PLACES = 8
-"""Largest number of failures that are remembered."""
-
-
-@dataclass(frozen=True)
-class FailedPlace:
-    """The waypoint at which a case failed."""
-
-    place: int
-    """Index of the waypoint."""
-    by_chance: bool
-    """True if it kept the limits, but not in enough samples."""
-
 
 Asked = tuple[tuple[Lever, Span | Choice], ...]
 """A few levers, and what each may be set to."""
@@ -47,7 +32,7 @@ def seek_remedies(refusal: JudgedCase) -> Iterator[tuple[tuple[Lever, ...], Reme
     Each is a few levers, and the remedy of their least setting that passes, if there is one. Only
     what the rover does by itself is tried in fine steps and combined.
     """
-    seeker, helped = _Seeker(refusal), False
+    helped = False
     own = [lever for lever in LEVERS if not lever.needs_others]
     for count, steps in ROUNDS:
         for levers in combinations(LEVERS if steps is COARSE else own, count):
@@ -57,7 +42,7 @@ def seek_remedies(refusal: JudgedCase) -> Iterator[tuple[tuple[Lever, ...], Reme
                 continue
             if steps is FINE and isinstance(asked[0][1], Choice):
                 continue
-            remedy = seeker.seek(asked, steps)
+            remedy = _seek(refusal, asked, steps)
             yield levers, remedy
             helped = helped or (remedy is not None and not remedy.needs_others)
         if helped:
@@ -74,87 +59,58 @@ def can_combine(levers: Sequence[Lever]) -> bool:
     return len(levers) < 3 or all(lever.keeps_rows for lever in levers)
 
 
-class _Seeker:
-    """Tries settings of levers on a refused path, and remembers where it failed."""
+def _seek(refusal: JudgedCase, asked: Asked, steps: Sequence[float]) -> Remedy | None:
+    """Return the remedy of levers in steps [share of the range], None if there is none."""
+    shares = [one.shares(steps) for _, one in asked]
+    # The nearest come first.
+    for chosen in sorted(product(*shares), key=lambda some: sum(map(abs, some))):
+        judged = _judge(refusal, asked, chosen)
+        if judged is not None:
+            step = steps[0] if len(asked) == 1 else 1.0
+            least, judged = _shrink(refusal, asked, list(chosen), judged, step)
+            set_levers = tuple(
+                SetLever(lever, one.value_at(share), one.now)
+                for (lever, one), share in zip(asked, least, strict=True)
+            )
+            return Remedy(refusal, set_levers, judged)
+    return None
 
-    def __init__(self, refusal: JudgedCase):
-        self._refusal = refusal
-        self._failed: list[FailedPlace] = []
-        """Places where cases failed, the last first."""
-        self._note(refusal)
 
-    def seek(self, asked: Asked, steps: Sequence[float]) -> Remedy | None:
-        """Return the remedy of levers in steps [share of the range], None if there is none."""
-        shares = [one.shares(steps) for _, one in asked]
-        # The nearest come first.
-        for chosen in sorted(product(*shares), key=lambda some: sum(map(abs, some))):
-            judged = self._judge(asked, chosen)
-            if judged is not None:
-                step = steps[0] if len(asked) == 1 else 1.0
-                least, judged = self._shrink(asked, list(chosen), judged, step)
-                set_levers = tuple(
-                    SetLever(lever, one.value_at(share), one.now)
-                    for (lever, one), share in zip(asked, least, strict=True)
-                )
-                return Remedy(self._refusal, set_levers, judged)
-        return None
+def _shrink(
+    refusal: JudgedCase, asked: Asked, shares: list[float], judged: JudgedCase, step: float
+) -> tuple[list[float], JudgedCase]:
+    """Return the least shares of the ranges that pass, one lever after the other, as judged.
 
-    def _shrink(
-        self, asked: Asked, shares: list[float], judged: JudgedCase, step: float
-    ) -> tuple[list[float], JudgedCase]:
-        """Return the least shares of the ranges that pass, one lever after the other, as judged.
+    The given ones pass; less by `step` may fail.
+    """
+    for k, (_, one) in enumerate(asked):
+        if isinstance(one, Choice):
+            continue
+        passes = shares[k]
+        fails = float(np.sign(passes)) * max(0.0, abs(passes) - step)
+        while abs(passes - fails) > TOLERANCE:
+            shares[k] = 0.5 * (passes + fails)
+            found = _judge(refusal, asked, shares)
+            if found is None:
+                fails = shares[k]
+            else:
+                passes, judged = shares[k], found
+        shares[k] = passes
+    return shares, judged
 
-        The given ones pass; less by `step` may fail.
-        """
-        for k, (_, one) in enumerate(asked):
-            if isinstance(one, Choice):
-                continue
-            passes = shares[k]
-            fails = float(np.sign(passes)) * max(0.0, abs(passes) - step)
-            while abs(passes - fails) > TOLERANCE:
-                shares[k] = 0.5 * (passes + fails)
-                found = self._judge(asked, shares)
-                if found is None:
-                    fails = shares[k]
-                else:
-                    passes, judged = shares[k], found
-            shares[k] = passes
-        return shares, judged
 
-    def _judge(self, asked: Asked, shares: Sequence[float]) -> JudgedCase | None:
-        """Return the case with levers set if it passes, else None."""
-        keeps_rows = all(lever.keeps_rows for lever, _ in asked)
-        case = self._refusal.case
-        try:
-            for (lever, one), share in zip(asked, shares, strict=True):
-                changed = lever.apply(case, self._refusal, one.value_at(share))
-                if changed is None:
-                    return None
-                case = changed
-            if keeps_rows and self._fails_where_known(case):
+def _judge(refusal: JudgedCase, asked: Asked, shares: Sequence[float]) -> JudgedCase | None:
+    """Return the refused case with levers set if it passes, else None."""
+    case = refusal.case
+    try:
+        for (lever, one), share in zip(asked, shares, strict=True):
+            changed = lever.apply(case, refusal, one.value_at(share))
+            if changed is None:
                 return None
-            judged = case.judge()
-        except RoverError:
-            return None  # the rover cannot do that
-        if not judged.passes and keeps_rows:
-            self._note(judged)
-        return judged if judged.passes else None
-
-    def _fails_where_known(self, case: Case) -> bool:
-        """Return whether a case fails where others have failed."""
-        for known in self._failed:
-            rows = self._refusal.rows_around(known.place)
-            if case.fails_at(known.place, rows, known.by_chance):
-                self._remember(known)
-                return True
-        return False
-
-    def _note(self, judged: JudgedCase) -> None:
-        """Remember where a case failed."""
-        verdict = judged.verdict
-        if verdict.code != TRAPPED:
-            self._remember(FailedPlace(verdict.first_failure, verdict.code == CHANCE))
-
-    def _remember(self, known: FailedPlace) -> None:
-        others = [one for one in self._failed if one != known]
-        self._failed = [known, *others][:MOST_PLACES]
+            case = changed
+        if all(lever.keeps_rows for lever, _ in asked) and refusal.fails_alike(case):
+            return None
+        judged = case.judge()
+    except RoverError:
+        return None  # the rover cannot do that
+    return judged if judged.passes else None

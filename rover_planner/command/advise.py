@@ -9,7 +9,7 @@ import typer
 
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command import shared
-from rover_planner.command.shared import argument, option, read_arm_angles
+from rover_planner.command.shared import argument, option, picture_option, read_arm_angles
 
 if TYPE_CHECKING:
     from rover_planner.advice.advise import Advice
@@ -33,7 +33,7 @@ def advise(
     accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     budget: Annotated[float, option("S", "Time for the advice in s.", min=0.01)] = 10.0,
     picture: Annotated[
-        Path | None, option("FILE", "Draw the remedies on the map (.png, .svg).")
+        Path | None, picture_option("Draw the remedies on the map (.png, .svg).")
     ] = None,
     max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
@@ -53,10 +53,6 @@ def advise(
     from rover_planner.planning.search.site import Site
     from rover_planner.shell.progress import show_progress
 
-    if picture is not None:
-        from rover_planner.figures.pictures import check_picture
-
-        check_picture(picture)
     model = load_rover(rover)
     options = PathQueryOptions(
         model=SweepOptions(
@@ -90,7 +86,7 @@ def advise(
     assert advice is not None
     _write(out, advice.to_dict())
     if picture is not None:
-        from rover_planner.figures.advice_picture import draw_advice
+        from rover_planner.figures.path_pictures import draw_advice
 
         draw_advice(picture, advice, Path(terrain).name)
     _print_table(advice)

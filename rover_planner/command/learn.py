@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_planner.command import shared
-from rover_planner.command.shared import argument, option
+from rover_planner.command.shared import argument, option, picture_option
 from rover_planner.shell.extras import need
 
 if TYPE_CHECKING:
     from rover_physics.numerics.arrays import Floats
     from rover_physics.rover.model import Rover
+    from rover_planner.learning.ground_learner import GroundEstimate
 
 CSV = ".csv"
 """Suffix of a drive that is no bag."""
@@ -26,7 +27,7 @@ def learn(
     log: Annotated[Path, argument("LOG", "The drive: a CSV file, or a bag.")],
     out: Annotated[Path, argument("OUT", "What was learned, .json; is overwritten.")],
     picture: Annotated[
-        Path | None, option("FILE", "Draw it along the way, .png, .svg or .pdf.")
+        Path | None, picture_option("Draw it along the way, .png, .svg or .pdf.")
     ] = None,
     ground: Annotated[
         Path | None, option("FILE", "Write the terrain with layers friction, friction_std, .npz.")
@@ -52,7 +53,7 @@ def learn(
     from rover_physics.files.user_file import write_file
     from rover_physics.files.validation import errors_of
     from rover_physics.rover.rover_file import load_rover
-    from rover_physics.terrain.grid import load_terrain
+    from rover_physics.terrain.grid import load_terrain, save_terrain
     from rover_planner.errors import PlanningError
     from rover_planner.learning.drive_faults import check_angles, explain_nothing
     from rover_planner.learning.drive_log import X, Y
@@ -64,10 +65,6 @@ def learn(
     told = model.friction if friction is None else friction
     if not 0.0 < told < np.inf:
         raise PlanningError(f"--friction is {told:g}; it must be above 0")
-    if picture is not None:
-        from rover_planner.figures.pictures import check_picture
-
-        check_picture(picture)
     rows = _read_log(log, model, odometry_topic)
     check_angles(rows, log)
     learner = GroundLearner(model, map_, told, soil)
@@ -86,24 +83,28 @@ def learn(
         write_file(out, f"{contents}\n".encode())
     mean, std = learner.layers
     if ground is not None:
-        from rover_physics.terrain.grid import save_terrain
-
         known = mean if map_.friction is None else map_.friction
         learned_map = replace(map_, friction=np.where(np.isfinite(mean), mean, known))
         save_terrain(ground, learned_map, friction_std=std)
     if picture is not None:
-        from rover_planner.figures.learning_picture import draw_learning
+        from rover_planner.figures.path_pictures import draw_learning
 
         draw_learning(picture, map_, np.array(places), estimates, mean)
-    found = learner.estimate.friction
-    high = "not bounded above" if found.high is None else f"at most {found.high:.2f}"
-    if learner.estimate.soil is not None:
-        sunk, strength = learner.estimate.soil.sinkage[0], learner.estimate.soil.strength[0]
-        high += f"; sinkage {1e3 * sunk:.1f} mm, strength {strength:.2f} of the load"
-    typer.echo(f"wrote {out}: friction {found.mean:.2f}, at least {found.low:.2f}, {high}")
+    typer.echo(f"wrote {out}: {_summarise(learner.estimate)}")
     if learner.estimate.faults:
         faults = ", ".join(f"{wheel} {word}" for wheel, word in learner.estimate.faults.items())
         typer.echo(f"warning: sensors that were not believed: {faults}", err=True)
+
+
+def _summarise(learned: "GroundEstimate") -> str:
+    """Return friction and what is known of the soil in words."""
+    found = learned.friction
+    high = "not bounded above" if found.high is None else f"at most {found.high:.2f}"
+    told = f"friction {found.mean:.2f}, at least {found.low:.2f}, {high}"
+    if learned.soil is None:
+        return told
+    sunk, strength = learned.soil.sinkage[0], learned.soil.strength[0]
+    return f"{told}; sinkage {1e3 * sunk:.1f} mm, strength {strength:.2f} of the load"
 
 
 def _read_log(path: Path, rover: "Rover", odometry_topic: str) -> "Floats":

@@ -9,14 +9,14 @@ import typer
 
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command import shared
-from rover_planner.command.shared import argument, flag, option
+from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 Out = Annotated[Path, argument("OUT", "The path with its predictions, .npz; written if found.")]
-Picture = Annotated[Path | None, option("FILE", "Draw the answer on the map (.png, .svg).")]
+Picture = Annotated[Path | None, picture_option("Draw the answer on the map (.png, .svg).")]
 
 
 def plan(
@@ -118,7 +118,7 @@ def _ask(
         assumed = assume(site.rover, site.options.model, site.options.map_sigmas)
         write_prediction(out, answer.path.prediction, answer.path.verdict, assumptions=assumed)
     if picture is not None:
-        from rover_planner.figures.path_picture import draw_path
+        from rover_planner.figures.path_pictures import draw_path
 
         draw_path(picture, question, answer, map_name)
     if answer.warning:

@@ -14,15 +14,10 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command import shared
 from rover_planner.command.shared import argument, flag, option, read_arm_angles
 
-MAX_IN_MEMORY = 20_000
-"""Largest number of poses whose prediction is kept in memory; longer paths are written in parts,
-except with classes or chances."""
-
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rover_physics.traversability.torque_ranges import TorqueRanges
     from rover_physics.traversability.verdict import Verdict
 
 
@@ -90,24 +85,22 @@ def predict(
     Exit code 0: it ran, with any verdict. 2: bad input.
     """
     gc.disable()  # imports make no garbage; to look for it takes a tenth of a short command's time
+    from rover_physics.prediction.path_kernels import LONGEST_STEP
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
-    from rover_physics.traversability.judge import judge_path, judge_poses
     from rover_planner.command.prediction_files import (
+        AskedPoses,
+        predict_to_file,
         read_curvature,
         read_poses,
-        write_parts,
-        write_prediction,
     )
-    from rover_planner.planning.assumptions import assume
+    from rover_planner.planning.learned_ground import lay_friction, read_learned
     from rover_planner.shell.progress import show_progress
 
     gc.freeze()
     gc.enable()
-    chance |= accepted_chance is not None
-    model = load_rover(rover)
-    ground = load_terrain(terrain, max_cells)
+    model, ground = load_rover(rover), load_terrain(terrain, max_cells)
     path = read_poses(poses)
     curvature = read_curvature(poses, len(path))
     options = SweepOptions(
@@ -123,55 +116,18 @@ def predict(
         backward=backward,
     )
     if learned is not None:
-        from rover_planner.planning.learned_ground import lay_friction, read_learned
-
-        known = read_learned(learned)
-        told = model.friction if friction is None else friction
+        known, told = read_learned(learned), model.friction if friction is None else friction
         ground = lay_friction(ground, known.assume_classes(ground, told))
         model, options = known.change(model), replace(options, friction=known.assume(told))
-    assumed = assume(model, options, sigmas)
+    if accepted_chance is None and chance:
+        accepted_chance = ACCEPTED_CHANCE
+    asked = AskedPoses(
+        model, ground, path, curvature, options, sigmas, accepted_chance, classes, torque_ranges
+    )
     with show_progress() as progress:
-        progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
-
-        def find_ranges() -> "TorqueRanges | None":
-            if not torque_ranges:
-                return None
-            from rover_physics.traversability.torque_ranges import find_torque_ranges
-
-            progress("find the ranges of the torques")
-            return find_torque_ranges(model, ground, path, options, curvature)
-
-        if len(path) > MAX_IN_MEMORY and not (classes or chance):
-            from rover_physics.traversability.judge import PartwiseJudge
-
-            judge = PartwiseJudge(model, ground, path, options, curvature=curvature, sigmas=sigmas)
-            verdict = write_parts(out, len(path), judge, find_ranges, assumed)
-        else:
-            accepted = ACCEPTED_CHANCE if accepted_chance is None else accepted_chance
-            asked = accepted if chance else None
-            if curvature is None:
-                prediction, verdict = judge_path(
-                    model, ground, path, options, sigmas=sigmas, accepted_chance=asked
-                )
-            else:
-                prediction, verdict = judge_poses(
-                    model, ground, path, curvature, options, sigmas=sigmas, accepted_chance=asked
-                )
-            found = None
-            if classes:
-                from rover_physics.traversability.classification import classify_judged
-
-                progress("classify the waypoints")
-                found = classify_judged(
-                    model, ground, prediction, verdict, options, sigmas=sigmas, curvature=curvature
-                )
-            write_prediction(
-                out, prediction, verdict, classes=found, ranges=find_ranges(), assumptions=assumed
-            )
+        verdict = predict_to_file(out, asked, progress)
     typer.echo(f"wrote {out}: {_summarise(len(path), verdict)}")
     if curvature is None:
-        from rover_physics.prediction.path_kernels import LONGEST_STEP
-
         _warn_of_long_steps(path, LONGEST_STEP * model.wheel.radius)
 
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads and writes the files of the `predict` command: poses and predictions."""
+"""The files of the `predict` command, poses and predictions: read, computed and written."""
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -12,16 +13,23 @@ from numpy.typing import DTypeLike, NDArray
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import FLAGS, NUMBERS, TEXTS, NpzParts, open_npz, write_npz
 from rover_physics.files.validation import errors_of, show_file
+from rover_physics.numerics.arrays import Floats
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import BOUNDED_VALUES, PathPrediction, prediction_of
 from rover_physics.results.record import QUANTITIES
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
+from rover_physics.traversability.judge import PartwiseJudge, judge_path, judge_poses
+from rover_physics.traversability.torque_ranges import TorqueRanges, find_torque_ranges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import Assumptions, read_assumptions, write_assumptions
-
-if TYPE_CHECKING:
-    from rover_physics.traversability.classification import ClassifiedWaypoint
-    from rover_physics.traversability.judge import PartwiseJudge
-    from rover_physics.traversability.torque_ranges import TorqueRanges
+from rover_planner.planning.assumptions import (
+    Assumptions,
+    assume,
+    read_assumptions,
+    write_assumptions,
+)
 
 Shape = tuple[int, ...]
 
@@ -45,6 +53,9 @@ MAX_NUMBER = 1e9
 """Largest magnitude in `poses` and SHOWN [m, rad, s]."""
 MAX_POSES = 1_000_000
 """Largest number of poses or waypoints in a file."""
+MAX_IN_MEMORY = 20_000
+"""Largest number of poses whose prediction is kept in memory; longer paths are written in parts,
+except with classes or chances."""
 BLOCK = 10_000
 """Number of reasons that are written at a time."""
 MAX_REASONS = 50_000_000
@@ -135,13 +146,70 @@ def _check_numbers(path: Path, arrays: dict[str, Any]) -> None:
             )
 
 
+@dataclass(frozen=True, eq=False)
+class AskedPoses:
+    """What `predict` is asked."""
+
+    rover: Rover
+    """The rover."""
+    terrain: Terrain
+    """The ground."""
+    poses: Floats
+    """(n, 3) x, y [m] and yaw [rad]: a path, or single poses."""
+    curvature: Floats | None
+    """(n,) curvatures [1/m] of single poses; None for a path."""
+    options: SweepOptions
+    """Torque policy, friction and more."""
+    sigmas: float
+    """Standard deviations to allow for where the map has them."""
+    accepted_chance: float | None
+    """Largest chance of failure of a path that is traversable; None: chances are not asked."""
+    classes: bool
+    """Whether the class of each waypoint is asked."""
+    torque_ranges: bool
+    """Whether the ranges of the torques are asked."""
+
+
+def predict_to_file(out: Path, asked: AskedPoses, report: Callable[[str], object]) -> Verdict:
+    """Predict poses and write what was asked to a file, as `write_prediction`; return the verdict.
+
+    `report` is called with what is done next.
+    """
+    rover, terrain, options, sigmas = asked.rover, asked.terrain, asked.options, asked.sigmas
+    path, bends, count = asked.poses, asked.curvature, len(asked.poses)
+    accepted = asked.accepted_chance
+    assumed, ranges, classes = assume(rover, options, sigmas), None, None
+    if asked.torque_ranges:
+        report("find the ranges of the torques")
+        ranges = find_torque_ranges(rover, terrain, path, options, bends)
+    report(f"sweep {count} poses of {rover.name} (the first run compiles the model)")
+    if count > MAX_IN_MEMORY and accepted is None and not asked.classes:
+        judge = PartwiseJudge(rover, terrain, path, options, curvature=bends, sigmas=sigmas)
+        return _write_parts(out, count, judge, assumed, ranges)
+    if bends is None:
+        prediction, verdict = judge_path(
+            rover, terrain, path, options, sigmas=sigmas, accepted_chance=accepted
+        )
+    else:
+        prediction, verdict = judge_poses(
+            rover, terrain, path, bends, options, sigmas=sigmas, accepted_chance=accepted
+        )
+    if asked.classes:
+        report("classify the waypoints")
+        classes = classify_judged(
+            rover, terrain, prediction, verdict, options, sigmas=sigmas, curvature=bends
+        )
+    write_prediction(out, prediction, verdict, classes=classes, ranges=ranges, assumptions=assumed)
+    return verdict
+
+
 def write_prediction(
     path: Path,
     prediction: PathPrediction,
     verdict: Verdict,
     *,
-    classes: "Sequence[ClassifiedWaypoint] | None" = None,
-    ranges: "TorqueRanges | None" = None,
+    classes: Sequence[ClassifiedWaypoint] | None = None,
+    ranges: TorqueRanges | None = None,
     assumptions: Assumptions | None = None,
 ) -> None:
     """Write a prediction and its verdict to an .npz file; the file name is not extended.
@@ -174,27 +242,16 @@ def write_prediction(
         write_npz(path, arrays, compressed=False)
 
 
-def write_parts(
+def _write_parts(
     path: Path,
     count: int,
-    judge: "PartwiseJudge",
-    find_ranges: "Callable[[], TorqueRanges | None]",
-    assumptions: Assumptions | None = None,
+    judge: PartwiseJudge,
+    assumptions: Assumptions,
+    ranges: TorqueRanges | None,
 ) -> Verdict:
     """Write a file as `write_prediction`, of a path that is too long to be kept in memory.
 
-    Args:
-        path: The file; an existing one is overwritten. Temporary files are made beside it.
-        count: Number of waypoints.
-        judge: Predicts and judges them part by part.
-        find_ranges: Called at the end for the torque ranges.
-        assumptions: As for `write_prediction`.
-
-    Returns:
-        The verdict on all waypoints.
-
-    Raises:
-        PlanningError: A file cannot be written.
+    Temporary files are made beside it. Returns the verdict on all `count` waypoints.
     """
     with errors_of(path, PlanningError), NpzParts(path.absolute().parent, count) as parts:
         for prediction in judge.parts():
@@ -204,7 +261,7 @@ def write_parts(
         for first in range(0, count, BLOCK):
             block = np.array(verdict.reasons[first : first + BLOCK], f"<U{longest}")
             parts.add({"reason": block})
-        parts.write(path, _summary_of(verdict, prediction, assumptions, find_ranges()))
+        parts.write(path, _summary_of(verdict, prediction, assumptions, ranges))
     return verdict
 
 
@@ -224,7 +281,7 @@ def _summary_of(
     verdict: Verdict,
     prediction: PathPrediction,
     assumptions: Assumptions | None,
-    ranges: "TorqueRanges | None",
+    ranges: TorqueRanges | None,
 ) -> dict[str, Any]:
     """Return the arrays about the whole path, chances of failure, and torque ranges."""
     arrays: dict[str, Any] = {

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.shared import argument, option
+from rover_planner.command.shared import argument, option, picture_option
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import read_numbers
@@ -17,7 +17,7 @@ from rover_planner.shell.poses import read_numbers
 def reachable(
     store: Annotated[Path, argument("OUT", "Zarr store of a survey.")],
     start: Annotated[str, option("X,Y", "Start in m, in the map's coordinates.", "--from")],
-    picture: Annotated[Path | None, option("FILE", "Draw the area on the map, .png.")] = None,
+    picture: Annotated[Path | None, picture_option("Draw the area on the map, .png.")] = None,
     geotiff: Annotated[
         Path | None, option("FILE", "Write the length of the paths as GeoTIFF (COG).")
     ] = None,
@@ -29,16 +29,11 @@ def reachable(
     need("zarr", "a survey")
     if geotiff is not None:
         need("rasterio", "a GeoTIFF")
-    if picture is not None:
-        need("matplotlib", "the picture of a survey")
     place = read_numbers(start, 2)
     if place is None:
         raise PlanningError(f"--from is {start!r}; it must be two numbers: X,Y or X Y")
-    if picture is not None:
-        from rover_planner.figures.pictures import check_picture
-
-        check_picture(picture)
     from rover_planner.shell.progress import show_progress
+    from rover_planner.survey.cog import write_cog
     from rover_planner.survey.reachable import explain_no_area, find_reachable
     from rover_planner.survey.store import SurveyStore
 
@@ -48,8 +43,6 @@ def reachable(
         area = find_reachable(opened, place[0], place[1], report=progress)
     notes, end = opened.notes, None
     if geotiff is not None:
-        from rover_planner.survey.cog import write_cog
-
         write_cog(geotiff, area.distance, notes.frame, notes.layout.step)
     if picture is not None:
         from rover_planner.figures.survey_picture import draw_reachable

@@ -3,11 +3,13 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rover_planner.errors import PlanningError
+from rover_planner.shell.extras import need
 
 if TYPE_CHECKING:
     from rover_physics.rover.model import Rover
@@ -26,6 +28,20 @@ def option(metavar: str, help: str, *names: str, **more: Any) -> Any:
 def flag(name: str, help: str) -> Any:
     """Return an option of typer that takes no value."""
     return typer.Option(name, help=help)
+
+
+def picture_option(help: str) -> Any:
+    """Return an option that takes the file of a picture, which is checked before long work."""
+    return option("FILE", help, callback=_check_picture)
+
+
+def _check_picture(path: Path | None) -> Path | None:
+    if path is not None:
+        need("matplotlib", "the picture")
+        from rover_planner.figures.pictures import check_picture
+
+        check_picture(path)
+    return path
 
 
 Vector = tuple[float, float, float]

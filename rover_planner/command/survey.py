@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_planner.command import shared
-from rover_planner.command.shared import argument, flag, option
+from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.extras import need
 from rover_planner.shell.run_program import EXIT_FAILED, EXIT_OK, end_as_by_ctrl_c, end_with
 
@@ -59,7 +59,7 @@ def survey(
     geotiff: Annotated[
         Path | None, option("FOLDER", "Write each layer as GeoTIFF (COG), too.")
     ] = None,
-    picture: Annotated[Path | None, option("FILE", "Draw the classes on the map, .png.")] = None,
+    picture: Annotated[Path | None, picture_option("Draw the classes on the map, .png.")] = None,
     max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> int:
     """Judge a rover at all cells of a map and all headings; write the results to a Zarr store.
@@ -70,14 +70,12 @@ def survey(
         need(module, "a survey")
     if geotiff is not None or Path(map_name).suffix.lower() in (".tif", ".tiff"):
         need("rasterio", "a GeoTIFF")
-    if picture is not None:
-        need("matplotlib", "the picture of a survey")
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
+    from rover_planner.survey.cog import make_folder, write_layers
     from rover_planner.survey.dask_cluster import ClusterSettings, check_settings
     from rover_planner.survey.request import SurveyRequest
-    from rover_planner.survey.runner import SurveyOutcome
-    from rover_planner.survey.survey import prepare_survey, summarise
+    from rover_planner.survey.survey import prepare_survey
 
     settings = ClusterSettings(scheduler, workers, memory_limit)
     check_settings(settings)
@@ -91,28 +89,44 @@ def survey(
         sigmas=sigmas,
     )
     if geotiff is not None:  # before hours of work
-        from rover_planner.survey.cog import make_folder
-
         make_folder(geotiff)
-    if picture is not None:
-        from rover_planner.figures.pictures import check_picture
-
-        check_picture(picture)
     with end_as_by_ctrl_c():
         prepared = prepare_survey(request, map_name, out, chunk, max_cells, max_gap, settings)
-        began, outcome = time.monotonic(), SurveyOutcome()
-        if prepared.chunks:  # what is finished may be read-only
-            with prepared.store.locked():
-                outcome = _run(prepared, settings)
+        began = time.monotonic()
+        outcome = _run(prepared, settings)
     if geotiff is not None:
-        from rover_planner.survey.cog import write_layers
-
         write_layers(prepared.store, geotiff)
     if picture is not None:
         from rover_planner.figures.survey_picture import draw_survey
 
         draw_survey(picture, prepared.store)
-    seconds = time.monotonic() - began
+    return _tell(prepared, outcome, time.monotonic() - began)
+
+
+def _run(prepared: "PreparedSurvey", settings: "ClusterSettings") -> "SurveyOutcome":
+    """Survey what is not finished; a store that is may be read-only."""
+    from rover_planner.shell.progress import show_bar, show_progress
+    from rover_planner.survey.runner import SurveyOutcome, run_survey
+    from rover_planner.survey.tile_survey import warm_up_survey
+
+    if not prepared.chunks:
+        return SurveyOutcome()
+    job, total = prepared.job, 0
+    for rows, columns in map(prepared.store.notes.layout.cells_of, prepared.chunks):
+        cells = (rows.stop - rows.start) * (columns.stop - columns.start)
+        total += cells * job.request.headings
+    with prepared.store.locked():
+        with show_progress() as progress:
+            progress("load the model (the first run compiles it)")
+            warm_up_survey(job.request)
+        with show_bar("survey", total, "poses") as advance:
+            return run_survey(job, prepared.chunks, settings, advance)
+
+
+def _tell(prepared: "PreparedSurvey", outcome: "SurveyOutcome", seconds: float) -> int:
+    """Print what became of a survey in a time [s]; return the exit code."""
+    from rover_planner.survey.survey import summarise
+
     report = {
         "out": str(prepared.store.path),
         **summarise(prepared.store),
@@ -131,21 +145,3 @@ def survey(
     more = f" and {len(outcome.failed) - 5} more" if len(outcome.failed) > 5 else ""
     why = next(iter(outcome.failed.values()))
     return end_with("rover_planner", EXIT_FAILED, f"chunks {names}{more} failed: {why}")
-
-
-def _run(prepared: "PreparedSurvey", settings: "ClusterSettings") -> "SurveyOutcome":
-    """Survey what is not finished."""
-    from rover_planner.shell.progress import show_bar, show_progress
-    from rover_planner.survey.runner import run_survey
-    from rover_planner.survey.tile_survey import warm_up_survey
-
-    job = prepared.job
-    with show_progress() as progress:
-        progress("load the model (the first run compiles it)")
-        warm_up_survey(job.request)
-    total = 0
-    for rows, columns in map(prepared.store.notes.layout.cells_of, prepared.chunks):
-        cells = (rows.stop - rows.start) * (columns.stop - columns.start)
-        total += cells * job.request.headings
-    with show_bar("survey", total, "poses") as advance:
-        return run_survey(job, prepared.chunks, settings, lambda report: advance(report.poses))

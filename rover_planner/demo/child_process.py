@@ -8,12 +8,10 @@ Linux kernel terminates when the process PARENT dies, even if that process was k
 import ctypes
 import os
 import runpy
-import select
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -23,7 +21,6 @@ GRACE = 4.0
 """Time that a process has to end after SIGTERM before it is killed [s]."""
 
 _PR_SET_PDEATHSIG = 1
-_POLL = 0.05
 
 
 class ChildProcess:
@@ -43,6 +40,8 @@ class ChildProcess:
                 stderr=log_file,
                 env=dict(environment),
                 start_new_session=True,
+                text=True,
+                errors="replace",
             )
 
     @property
@@ -51,60 +50,46 @@ class ChildProcess:
         return self._process.pid
 
     @property
+    def exit_code(self) -> int | None:
+        """Exit code, negative for a signal; None while the process is running."""
+        return self._process.poll()
+
+    @property
     def running(self) -> bool:
         """True if the process is still running."""
         return self.exit_code is None
 
-    @property
-    def exit_code(self) -> int | None:
-        """Exit code, negative for a signal; None while the process is running.
-
-        Asking does not reap the process, so that its number stays that of its group.
-        """
-        if self._process.returncode is not None:
-            return self._process.returncode
-        result = os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
-        if result is None:
-            return None
-        return result.si_status if result.si_code == os.CLD_EXITED else -result.si_status
-
-    def lines(self, watch: Callable[[], None]) -> Iterator[str]:
-        """Yield the lines of standard output until it closes; call `watch` regularly meanwhile."""
+    def lines(self) -> Iterator[str]:
+        """Yield the lines of standard output until it closes."""
         assert self._process.stdout is not None
-        descriptor = self._process.stdout.fileno()
-        pending = b""
-        while True:
-            watch()
-            if not select.select([descriptor], [], [], 0.2)[0]:
-                continue
-            received = os.read(descriptor, 1 << 16)
-            if not received:
-                return
-            *whole, pending = (pending + received).split(b"\n")
-            yield from (line.decode(errors="replace") for line in whole)
+        for line in self._process.stdout:
+            yield line.rstrip("\n")
 
     def last_line(self) -> str:
         """Return the last non-empty line of the log."""
         lines = self.log.read_text(errors="replace").splitlines()
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
 
-    def stop(self) -> None:
-        """End the whole process group: send SIGTERM, wait for GRACE, then kill."""
-        if self._process.returncode is not None:
-            return
-        self._signal(signal.SIGTERM)
-        deadline = time.monotonic() + GRACE
-        while self.running and time.monotonic() < deadline:
-            time.sleep(_POLL)
-        # the leader has not been reaped yet, so its id still belongs to this group
-        self._signal(signal.SIGKILL)
-        self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+    def wait(self, seconds: float | None = None) -> int | None:
+        """Wait for the end, if wanted at most for a time [s]; return `exit_code`."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+        return self.exit_code
 
-    def _signal(self, number: int) -> None:
+    def send_signal(self, number: int) -> None:
+        """Send a signal to the whole process group."""
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.pid, number)
+
+    def stop(self) -> None:
+        """End the whole process group: send SIGTERM, wait for GRACE, then kill."""
+        if self.running:
+            self.send_signal(signal.SIGTERM)
+            self.wait(GRACE)
+            self.send_signal(signal.SIGKILL)
+            self.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
 
 @contextmanager

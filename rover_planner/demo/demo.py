@@ -7,15 +7,15 @@ table come from the service. The candidate paths in the picture are recomputed i
 """
 
 import dataclasses
-import importlib.util
 import json
 import os
 import random
+import signal
 import socket
-import time
+import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.markup import escape
@@ -32,12 +32,15 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.demo.goals import Mission, Pose, choose_mission
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.known_map import describe_terrain
+from rover_planner.planning.path_query import PathAnswer, add_path
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import find_path
+from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.search.site import Site
+from rover_planner.shell.extras import need
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-
-if TYPE_CHECKING:
-    from rover_planner.planning.path_query import PathAnswer
 
 COMPILER = "rover_physics.warm_up"
 """Module that compiles the kernels when it is run."""
@@ -55,27 +58,6 @@ ANSWER_COLUMNS = (
     ("highest\nload [N]", "max_wheel_load", 1),
 )
 """Columns of numbers: heading, key of the answer, digits after the point."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Stage:
-    """The child processes of a demo, and what they have in common."""
-
-    steps: Steps
-    """Shows what is being done."""
-    children: list[ChildProcess]
-    """Are stopped when the demo ends."""
-    environment: dict[str, str]
-    """Their environment variables."""
-    folder: Path
-    """Folder of their logs."""
-
-    def start(self, module: str, arguments: Sequence[str] = ()) -> ChildProcess:
-        """Start a module; its log has its name."""
-        log = self.folder / f"{module.rpartition('.')[2]}.log"
-        child = ChildProcess(module, arguments, self.environment, log)
-        self.children.append(child)
-        return child
 
 
 def run_demo(
@@ -99,23 +81,32 @@ def run_demo(
         The server's verdict on each goal.
 
     Raises:
-        PlanningError, RoverError: Bad input.
-        DemoError: ROS 2 is missing, or a process failed.
+        PlanningError, RoverError: Bad input, or ROS 2 or matplotlib is missing.
+        DemoError: A process failed.
     """
     steps = Steps()
-    _check_environment()
+    need("rclpy", "the demo")
+    need("matplotlib", "the picture of the demo")
     _prepare_folder(picture)
     rover = load_rover(rover_name)
     map_name, terrain = _prepare_map(steps, map_name, picture.parent, seed)
     with steps.step(f"interpolate gaps of the map up to {max_gap:g} m wide") as status:
         ground = _as_the_server_knows_it(terrain, max_gap)
         status.update(f"{status.status}: {np.isfinite(ground.elevation).mean():.0%} known")
-    mission = choose_mission(ground, rover, seed)
+    mission, environment = choose_mission(ground, rover, seed), _environment()
     with stopping_children() as children:
-        stage = Stage(steps, children, _environment(), picture.parent)
-        _compile(stage)
-        server = stage.start(SERVER, _server_parameters(rover_name, max_gap))
-        answers = _ask_server(stage, server, map_name, mission)
+
+        def start(module: str, arguments: Sequence[str] = ()) -> ChildProcess:
+            """Start a module; its log has its name."""
+            log = picture.parent / f"{module.rpartition('.')[2]}.log"
+            children.append(ChildProcess(module, arguments, environment, log))
+            return children[-1]
+
+        with steps.step("compile the model's kernels (the first time takes a while)"):
+            _expect_success(start(COMPILER))
+        server = start(SERVER, _server_parameters(rover_name, max_gap))
+        planner = start(PLANNER, _planner_options(map_name, mission))
+        answers = _ask(steps, server, planner, mission)
         with steps.step("stop the server and the mission planner"):
             for child in reversed(children):
                 child.stop()
@@ -127,19 +118,6 @@ def run_demo(
         soft_wrap=True,
     )
     return answers
-
-
-def _check_environment() -> None:
-    """Raise DemoError if ROS 2 or matplotlib is missing."""
-    for module, what in (
-        ("rclpy", "ROS 2 Jazzy"),
-        ("nav_msgs", "nav_msgs"),
-        ("matplotlib", "matplotlib"),
-    ):
-        if importlib.util.find_spec(module) is None:
-            raise DemoError(
-                f"the demo needs {what}, which is not there: source ROS 2, or pip install .[all]"
-            )
 
 
 def _prepare_folder(picture: Path) -> None:
@@ -160,17 +138,14 @@ def _prepare_map(
     steps: Steps, map_name: str | None, folder: Path, seed: int
 ) -> tuple[str, Terrain]:
     """Load the map, or generate and save one; return its name and terrain."""
-    if map_name is not None:
-        with steps.step(f"load the map {escape(map_name)}") as status:
-            terrain = load_terrain(map_name)
-            status.update(f"{status.status}: {describe_terrain(terrain)}")
-        return map_name, terrain
-    with steps.step(f"make a Mars-like terrain, seed {seed}") as status:
-        path = folder / "terrain.npz"
-        save_terrain(path, make_mars_terrain(seed))
-        terrain = load_terrain(path)
+    name = str(folder / "terrain.npz") if map_name is None else map_name
+    made, loaded = f"make a Mars-like terrain, seed {seed}", f"load the map {escape(name)}"
+    with steps.step(made if map_name is None else loaded) as status:
+        if map_name is None:
+            save_terrain(name, make_mars_terrain(seed))
+        terrain = load_terrain(name)
         status.update(f"{status.status}: {describe_terrain(terrain)}")
-    return str(path), terrain
+    return name, terrain
 
 
 def _as_the_server_knows_it(terrain: Terrain, max_gap: float) -> Terrain:
@@ -183,6 +158,16 @@ def _server_parameters(rover_name: str, max_gap: float) -> tuple[str, ...]:
     """Return the command-line arguments that set the server's parameters."""
     values = {"rover": rover_name, "unknown_cells": "interpolate", "max_gap": float(max_gap)}
     return ("--ros-args", *(word for key in values for word in ("-p", f"{key}:={values[key]}")))
+
+
+def _planner_options(map_name: str, mission: Mission) -> tuple[str, ...]:
+    """Return the command-line arguments that name map, start and goals to the mission planner."""
+    start, *goals = (
+        ",".join(repr(float(value)) for value in pose)
+        for pose in (mission.start, *(goal.pose for goal in mission.goals))
+    )
+    ends = (f"--start={start}", *(f"--goal={goal}" for goal in goals))
+    return ("--json", f"--map={map_name}", *ends)
 
 
 def _environment() -> dict[str, str]:
@@ -215,29 +200,17 @@ def _free_domain() -> int:
     return domains[0]
 
 
-def _compile(stage: Stage) -> None:
-    """Compile the kernels in a child process, which can be stopped at any time."""
-    with stage.steps.step("compile the model's kernels (the first time takes a while)"):
-        child = stage.start(COMPILER)
-        for _ in child.lines(lambda: None):
-            pass
-        _expect_success(child)
-
-
-def _ask_server(
-    stage: Stage, server: ChildProcess, map_name: str, mission: Mission
+def _ask(
+    steps: Steps, server: ChildProcess, planner: ChildProcess, mission: Mission
 ) -> list[dict[str, Any]]:
-    """Start the mission planner; return the server's verdict on each goal."""
-    with stage.steps.step("start traverse_server and find it over DDS") as status:
-        poses = [f"--goal={_join(goal.pose)}" for goal in mission.goals]
-        asked = ["--json", f"--map={map_name}", f"--start={_join(mission.start)}", *poses]
-        planner = stage.start(PLANNER, asked)
+    """Return the server's verdict on each goal, for which the mission planner asks."""
+    with steps.step("start traverse_server and find it over DDS") as status:
         events = _events(planner, server)
         _skip_to(events, "publishing the map", planner)
         status.update("publish the map over DDS")
         _skip_to(events, "asking", planner)
     answers: list[dict[str, Any]] = []
-    with stage.steps.step(f"ask for {len(mission.goals)} goals") as status:
+    with steps.step(f"ask for {len(mission.goals)} goals") as status:
         for event in events:
             if event["event"] == "answer":
                 answers.append(event["answer"])
@@ -251,22 +224,19 @@ def _ask_server(
     return answers
 
 
-def _join(pose) -> str:
-    return ",".join(repr(float(value)) for value in pose)
-
-
 def _events(planner: ChildProcess, server: ChildProcess) -> Iterator[dict[str, Any]]:
     """Yield the mission planner's events; raise DemoError if the server ends."""
 
-    def watch() -> None:
-        if not server.running:
-            raise DemoError(
-                f"{server.name} ended with code {server.exit_code}: {server.last_line()} "
-                f"(see {server.log})"
-            )
+    def end_together() -> None:
+        server.wait()
+        if planner.running:
+            planner.send_signal(signal.SIGTERM)
 
-    for line in planner.lines(watch):
+    threading.Thread(target=end_together, daemon=True).start()
+    for line in planner.lines():
         yield json.loads(line)
+    if not server.running:
+        raise _failure_of(server)
 
 
 def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess) -> None:
@@ -278,13 +248,15 @@ def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess)
 
 def _expect_success(child: ChildProcess) -> None:
     """Wait until a child has ended; raise DemoError if it failed."""
-    while child.running:
-        time.sleep(0.02)
-    if child.exit_code != EXIT_OK:
-        raise DemoError(
-            f"{child.name} ended with code {child.exit_code}: {child.last_line()} "
-            f"(see {child.log})"
-        )
+    if child.wait() != EXIT_OK:
+        raise _failure_of(child)
+
+
+def _failure_of(child: ChildProcess) -> DemoError:
+    """Return the error that tells how a child has ended."""
+    return DemoError(
+        f"{child.name} ended with code {child.exit_code}: {child.last_line()} (see {child.log})"
+    )
 
 
 def _draw(
@@ -310,14 +282,8 @@ def _draw(
     )
 
 
-def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> "PathAnswer":
+def answer_as_a_server(rover: Rover, ground: Terrain, start: Pose, goal: Pose) -> PathAnswer:
     """Return the best candidate path, or if all are refused the one that a search finds."""
-    from rover_planner.planning.path_query import add_path
-    from rover_planner.planning.search.judge import PathJudge
-    from rover_planner.planning.search.path_search import find_path
-    from rover_planner.planning.search.query import SearchQuery
-    from rover_planner.planning.search.site import Site
-
     site = Site(rover, ground)
     answer = PathJudge(site).search(start, goal)
     if answer.traversable or not ground.contains(*goal[:2]):

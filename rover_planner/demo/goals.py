@@ -13,7 +13,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
-from rover_planner.maps.cells import grid_of
+from rover_planner.maps.cells import CellGrid, grid_of
 
 Pose = tuple[float, float, float]
 
@@ -58,6 +58,7 @@ class _Ground:
     """Properties of a map for a rover: one value per cell, for a rover centred there."""
 
     terrain: Terrain
+    grid: CellGrid
     slope: NDArray[np.float64]
     """Mean slope under the rover (ny, nx) [rise over run]; NaN if the footprint is not known."""
     gentle: NDArray[np.bool_]
@@ -68,21 +69,6 @@ class _Ground:
     """Largest distance of a goal from the start [m]."""
     near: float
     """Smallest distance of a goal from the start [m]."""
-
-    def cells(self, x, y) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
-        """Return row and column of points x, y [m], and a mask of those on the map."""
-        ny, nx = self.slope.shape
-        column, row = map(np.rint, grid_of(self.terrain).coordinates(np.asarray(x), np.asarray(y)))
-        inside = (column >= 0) & (column < nx) & (row >= 0) & (row < ny)
-        return (
-            np.clip(row, 0, ny - 1).astype(int),
-            np.clip(column, 0, nx - 1).astype(int),
-            inside,
-        )
-
-    def places(self, rows, columns) -> tuple[Any, Any]:
-        """Return x and y [m] of cells."""
-        return grid_of(self.terrain).places(np.asarray(columns), np.asarray(rows))
 
 
 def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1) -> Mission:
@@ -108,7 +94,7 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1) -> Mission:
     for intent, score in _score_cells(ground, start):
         best = np.unravel_index(np.argmax(score), score.shape)
         if np.isfinite(score[best]):
-            found.append((intent, _facing(start, *ground.places(*best))))
+            found.append((intent, _facing(start, *ground.grid.places(best[1], best[0]))))
     found.append(("off the map", _choose_off_map(ground, start)))
     goals = (Goal(chr(ord("A") + k), intent, pose) for k, (intent, pose) in enumerate(found))
     return Mission(start, tuple(goals))
@@ -147,6 +133,7 @@ def _survey(terrain: Terrain, rover: Rover) -> _Ground:
     wheelbase = 2 * footprint_radius(rover)
     return _Ground(
         terrain,
+        grid_of(terrain),
         np.where(whole, slope, np.nan),
         whole & (slope <= gentle_slope),
         np.where(whole, difficulty, np.nan),
@@ -161,7 +148,7 @@ def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
     share = ground.difficulty[rows, columns]
     gentle = share <= max(0.5, np.quantile(share, 0.1))
     chosen = rng.permutation(np.nonzero(gentle)[0])[:_STARTS]
-    x, y = ground.places(rows[chosen], columns[chosen])
+    x, y = ground.grid.places(columns[chosen], rows[chosen])
     bearings = np.linspace(-np.pi, np.pi, _RAYS, endpoint=False)
     sight = _sight(ground, ground.gentle, np.column_stack([x, y]), bearings)
     cone = round(_HALF_CONE / (2 * np.pi / _RAYS))
@@ -179,8 +166,9 @@ def _sight(ground: _Ground, clear: NDArray[np.bool_], places, bearings) -> NDArr
     distances = np.arange(0.0, ground.far, step)
     px = places[:, 0, None, None] + distances * np.cos(bearings)[:, None]
     py = places[:, 1, None, None] + distances * np.sin(bearings)[:, None]
-    row, column, inside = ground.cells(px, py)
-    return np.asarray(step * np.cumprod(inside & clear[row, column], axis=2).sum(axis=2), float)
+    column, row = ground.grid.coordinates(px, py)
+    seen = ndimage.map_coordinates(clear, [row, column], order=0, mode="grid-constant")
+    return np.asarray(step * np.cumprod(seen, axis=2).sum(axis=2), float)
 
 
 def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
@@ -204,13 +192,13 @@ def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
 
 def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[Any, Any]:
     """Return the place with the least difficulty around a point."""
-    row, column, _ = ground.cells(x, y)
+    column, row = map(round, ground.grid.coordinates(x, y))
     around = max(1, round(0.06 * ground.far / ground.terrain.resolution))
-    j, i = max(0, int(row) - around), max(0, int(column) - around)
-    window = ground.difficulty[j : int(row) + around + 1, i : int(column) + around + 1]
+    j, i = max(0, row - around), max(0, column - around)
+    window = ground.difficulty[j : row + around + 1, i : column + around + 1]
     window = np.where(np.isfinite(window), window, np.inf)
     best = np.unravel_index(np.argmin(window), window.shape)
-    return ground.places(best[0] + j, best[1] + i)
+    return ground.grid.places(best[1] + i, best[0] + j)
 
 
 def _score_cells(ground: _Ground, start: Pose) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -220,7 +208,7 @@ def _score_cells(ground: _Ground, start: Pose) -> Iterator[tuple[str, NDArray[np
     known ground, and near places that are well inside unknown ground.
     """
     ny, nx = ground.slope.shape
-    x, y = ground.places(np.arange(ny)[:, None], np.arange(nx))
+    x, y = ground.grid.places(np.arange(nx), np.arange(ny)[:, None])
     dx, dy = x - start[0], y - start[1]
     distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
     turn = np.abs(wrap(bearing - start[2]))

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.angles import wrap
 from rover_planner.maps.cells import CellBox, grid_of
 from rover_planner.maps.layers import FOOTPRINT, CellSources
 
@@ -63,7 +62,6 @@ class ObservedGround:
         """
         if self._is_seen_around(rover, poses):
             return UnobservedShare(0.0, 0.0, -1, -1)
-        poses, waypoints = self._spread_out(rover, poses)
         worst, swept = self._look_below(rover, poses)
         counts = np.bincount(self.kinds[swept], minlength=3)
         if not counts.any():
@@ -71,8 +69,7 @@ class ObservedGround:
         total, assumed = int(counts.sum()), int(counts[ASSUMED])
         unobserved = (assumed + int(counts[UNSEEN])) / total
         first, beyond = (
-            int(waypoints[np.argmax(worst > best)]) if worst.max() > best else -1
-            for best in (SEEN, ASSUMED)
+            int(np.argmax(worst > best)) if worst.max() > best else -1 for best in (SEEN, ASSUMED)
         )
         return UnobservedShare(unobserved, assumed / total, first, beyond)
 
@@ -95,19 +92,6 @@ class ObservedGround:
         box = grid_of(self.terrain).box_around(0.5 * (low + high), 0.5 * (high - low) + reach)
         whole = CellBox(0, 0, *self.kinds.shape)
         return whole.contains(box) and not (self.kinds[box.within(whole)] != SEEN).any()
-
-    def _spread_out(
-        self, rover: Rover, poses: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Return the poses at which the belly has moved on by a cell, and their indices."""
-        steps = np.diff(poses, axis=0)
-        turns = np.abs(wrap(steps[:, 2]))
-        moved = np.hypot(*steps[:, :2].T) + _corner_distance(rover) * turns
-        distance = np.concatenate([[0.0], np.cumsum(moved)])
-        cells = np.floor(distance / self.terrain.resolution)
-        kept = np.concatenate([[True], np.diff(cells) > 0])
-        kept[-1] = True
-        return poses[kept], np.flatnonzero(kept)
 
     def _look_below(
         self, rover: Rover, poses: NDArray[np.float64]

@@ -19,7 +19,6 @@ from std_msgs.msg import Header
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.results.grids import terrain_to_occupancy_grid
-from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
 from rover_planner.maps.known_map import KnownMap, describe_terrain
@@ -103,7 +102,6 @@ class MapTopics(MapIntake):
         if self._is_from_topic and not are_gridded_alike(before, settings.parameters):
             self.repeat()
         else:
-            self.do(self.expect_other)
             self.do(self._service.refresh_map)
 
     def _load_map(
@@ -145,14 +143,6 @@ class MapTopics(MapIntake):
         """Have unknown ground under the rover filled, if that is due."""
         if self._inputs.may_fill_under_rover():
             self.do(self._fill_under_rover)
-
-    def renew(self, cloud: Any) -> None:
-        """Take a cloud that says what the map in use says; where maps merge, cells are newer."""
-        if self._inputs.keeper.merges:
-            self.prepare(cloud, None)
-        else:
-            self._service.renew_map(stamp_to_ns(cloud.header.stamp))
-            self._report("")
 
     def prepare(self, message: Any, source: Rigid | None) -> None:
         """Take a PointCloud2 or GridMap into the map."""

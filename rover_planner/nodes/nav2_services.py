@@ -17,11 +17,10 @@ from rclpy.node import Node
 from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.nodes.result_topics import ResultMessages
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
-from rover_planner.planning.answering.judgement import PathJudgement
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement
 from rover_planner.planning.answering.questions import Question
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.planning.path_geometry import next_given_poses
-from rover_planner.planning.verdict_report import IdentityReport
+from rover_planner.planning.path_geometry import densify
 from rover_planner.ros.optional_types import find_type
 
 NO_PATH = "NO_VALID_PATH"
@@ -89,10 +88,9 @@ class Nav2Services:
         if judged.candidate is not None:
             assert judged.site is not None
             assert isinstance(given, GivenPath) and given.poses is not None
-            spacing = judged.site.options.waypoint_spacing
-            response.invalid_pose_indices = find_invalid_poses(
-                judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
-            )
+            _, next_given = densify(given.poses, judged.site.options.waypoint_spacing)
+            codes = judged.candidate.verdict.codes
+            response.invalid_pose_indices = find_invalid_poses(codes, next_given)
         self._publish(judged, answer.identity)
 
     def compute(self, handle: Any) -> None:

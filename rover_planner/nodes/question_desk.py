@@ -21,14 +21,13 @@ from msg_adapters.results.diagnostics import SEARCH, make_status
 from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget
-from rover_planner.planning.answering.judgement import PathJudgement, refuse_for
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement, refuse_for
 from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
 from rover_planner.planning.answering.questions import Question, Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import PacedSender, Reply, serve_later
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import topic_qos

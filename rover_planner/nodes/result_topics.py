@@ -22,9 +22,7 @@ from msg_adapters.stamps import ns_to_stamp
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
-from rover_planner.ros.deferred import DeferredWork
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement, VerdictReport
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
@@ -46,7 +44,6 @@ class ResultTopics:
     def __init__(self, node: RoverNode[TraverseServerParameters], inputs: ServerInputs):
         """Create the topics; `inputs` know the rover, and joints and frame of messages."""
         self._node, self._inputs = node, inputs
-        self._deferred_work = DeferredWork(node, node.guard)
         self._stamp = 0
         self._topics = {
             name: LazyPublisher(node, kind, f"~/{name}") for name, (kind, _) in RESULTS.items()
@@ -66,11 +63,10 @@ class ResultTopics:
         if judgement.traversable and not identity.path_hash:
             path_hash, path_stamp = describe_path(results.plan)
             results.identity = replace(identity, path_hash=path_hash, path_stamp=path_stamp)
-        publications = [
-            partial(self._topics[name].publish, partial(make, results))
-            for name, (_, make) in RESULTS.items()
-        ]
-        self._deferred_work.do(partial(self._log, results), *publications)
+        self._node.handover.call(partial(self._log, results))
+        for name, (_, make) in RESULTS.items():
+            publish = partial(self._topics[name].publish, partial(make, results))
+            self._node.handover.call(publish)
         return results
 
     def _next_stamp(self) -> int:

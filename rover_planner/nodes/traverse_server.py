@@ -35,8 +35,8 @@ from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
-from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.questions import PathQuestion, UnreadableRequest
+from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement
+from rover_planner.planning.answering.questions import PathQuestion
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import (
     ServiceSettings,
@@ -46,7 +46,6 @@ from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.path_query import Pose
-from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer
@@ -241,7 +240,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         except RoverError as error:
             return GivenPath(None, str(error), *describe_path(path), code="bad_request")
 
-    def read_question(self, request: GetPlan.Request) -> PathQuestion | UnreadableRequest:
+    def read_question(self, request: GetPlan.Request) -> PathQuestion:
         """Return the question for a path between poses of the robot, by the transforms of now.
 
         An empty start is where the rover is.
@@ -252,7 +251,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             start = self._find_here() if is_empty(begin) else read(begin, "start")
             return PathQuestion(start, read(end, "goal"), tolerance, about)
         except RoverError as error:
-            return UnreadableRequest(str(error), about)
+            return PathQuestion(hash=about, refusal=str(error))
 
     def _fill_plan(
         self, _request: object, response: GetPlan.Response, answer: Answer[PathJudgement]

@@ -33,20 +33,17 @@ _SAME_PLACE = 1e-9
 """Distance below which start and goal are the same position [m]."""
 _LONG_WAY_ROUND = 1.5
 """Dubins paths longer than the shortest one by more than this factor are dropped."""
-_FINE_SAMPLES = 501
-"""Samples of a curve from which its waypoints are interpolated."""
-_FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
-"""Curve parameters of the fine samples and half-way between them."""
-
-
-def _weigh_slopes(t: np.ndarray) -> np.ndarray:
-    """Return the weights (4, n) of chord, end tangents and bump in the derivative of a curve."""
-    bump = np.pi * np.sin(2 * np.pi * t)
-    return np.array([6 * t * (1 - t), (1 - t) * (1 - 3 * t), t * (3 * t - 2), bump])
-
-
-_FINE_SLOPES = _weigh_slopes(_FINE)
-"""These weights at the fine samples."""
+_FINE = np.linspace(0.0, 1.0, 1001)
+"""Curve parameters at which a curve is measured, and from which its waypoints are interpolated."""
+_SHARES = np.column_stack(
+    [
+        _FINE**2 * (3 - 2 * _FINE),
+        _FINE * (1 - _FINE) ** 2,
+        -(_FINE**2) * (1 - _FINE),
+        0.5 * (1 - np.cos(2 * np.pi * _FINE)),
+    ]
+)
+"""Shares (n, 4) of chord, end tangents and bump in a curve there."""
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
 """Lengths of the end tangents in chords; the first one whose direct curve is drivable is used."""
 
@@ -104,17 +101,17 @@ def generate_candidates(
     if chord > _SAME_PLACE:
         paths = _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius)
     if not paths:
-        paths = _build_arcs(start, goal, count, waypoint_spacing, min_radius)
+        paths = dubins_paths(start, goal, min_radius, waypoint_spacing, count)
+        longest = _LONG_WAY_ROUND * path_length(paths[0])
+        paths = [path for path in paths if path_length(path) <= longest]
     if swing_radius is not None:
         turned, length = turn_and_drive(start, goal, swing_radius, waypoint_spacing)
         if length < min(path_length(path) for path in paths) - _SAME_PLACE:
             paths = [*paths[: count - 1], turned]
-    return [_pin_ends(path, start, goal) for path in paths]
-
-
-def lateral_offsets(count: int, spacing: float) -> list[float]:
-    """Return the lateral offsets of a fan [m]: 0, then left and right alternately, outwards."""
-    return [spacing * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(count)]
+    for path in paths:
+        path[0], path[-1] = start, goal  # without rounding errors
+        path[:, 2] = wrap(path[:, 2])
+    return paths
 
 
 def path_length(poses: np.ndarray) -> float:
@@ -125,85 +122,54 @@ def path_length(poses: np.ndarray) -> float:
 def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:
     """Sample the direct curve and its neighbours; return [] if the direct one is too tight.
 
-    A curve is the start plus weights of its chord, its end tangents and a bump across the chord.
+    A curve is the start plus shares of its chord, its end tangents and a bump across the chord.
     """
     chord, yaws = goal[:2] - start[:2], np.array([start[2], goal[2]])
     length = np.hypot(*chord)
     left = np.array([-chord[1], chord[0]]) / length
     for scale in _TANGENT_SCALES:
-        tangents = scale * length * np.array([np.cos(yaws), np.sin(yaws)])
+        tangents = scale * length * np.column_stack([np.cos(yaws), np.sin(yaws)])
         paths = []
-        for offset in lateral_offsets(count, spacing):
-            curve = np.column_stack([chord, tangents, offset * left])
-            slope = curve @ _FINE_SLOPES
-            speed = np.hypot(slope[0], slope[1])
-            if _is_drivable(slope, speed, min_radius):
-                paths.append(_sample(start, curve, speed, waypoint_spacing))
-            elif offset == 0.0:
+        for k in range(count):  # to the left and to the right alternately
+            offset = spacing * ((k + 1) // 2) * (1 if k % 2 else -1)
+            places = _SHARES @ np.vstack([chord, tangents, offset * left])
+            path = _sample(places, yaws, waypoint_spacing, min_radius)
+            if path is not None:
+                path[:, :2] += start[:2]
+                paths.append(path)
+            elif k == 0:
                 break
         if paths:
             return paths
     return []
 
 
-def _is_drivable(slope: np.ndarray, speed: np.ndarray, min_radius: float) -> bool:
-    """Return whether no radius of a curve is smaller than `min_radius` [m].
+def _sample(
+    places: np.ndarray, yaws: np.ndarray, waypoint_spacing: float, min_radius: float
+) -> np.ndarray | None:
+    """Sample equidistant poses of a curve; None if it is too tight to drive.
 
     Args:
-        slope: (2, n) its derivative at the fine samples.
-        speed: (n,) the size of the derivative.
-        min_radius: Smallest radius [m].
+        places: (n, 2) x, y of the curve at many places [m].
+        yaws: (2,) its headings at both ends [rad].
+        waypoint_spacing: Largest distance of the poses [m].
+        min_radius: Smallest radius that is not too tight [m].
     """
-    (x, y), ends = slope[:, ::2], speed[::2]
-    if ends.min() <= 1e-6 * ends.max():
-        return False
-    across, along = x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:]
-    driven = 0.5 * (ends[1:] + ends[:-1]) / len(across)
-    turned = np.abs(np.arctan2(across, along))
-    return bool((turned * min_radius <= driven * (1 + 1e-9)).all())
-
-
-def _sample(start, curve: np.ndarray, speed: np.ndarray, waypoint_spacing: float) -> np.ndarray:
-    """Sample equidistant poses (n, 3) of a curve, at most `waypoint_spacing` [m] apart."""
     check_interruption()  # a question may have many long candidates
-    ends, middles = speed[::2], speed[1::2]
-    pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
+    steps = np.diff(places, axis=0)
+    pieces = np.hypot(*steps.T)
+    if pieces.min() <= 1e-6 * pieces.max():
+        return None
     driven = np.concatenate([[0.0], np.cumsum(pieces)])
+    # A piece of the curve has its mean heading half-way, both ends have their own.
+    middles = np.concatenate([[0.0], driven[1:] - 0.5 * pieces, driven[-1:]])
+    along = np.arctan2(steps[:, 1], steps[:, 0])
+    yaw = np.unwrap(np.concatenate([yaws[:1], along, yaws[1:]]))
+    if (np.abs(np.diff(yaw)) * min_radius > np.diff(middles) * (1 + 1e-9)).any():
+        return None
     marks = np.linspace(0.0, driven[-1], 1 + count_steps(driven[-1], waypoint_spacing))
-    t = _interpolate(marks, driven, _FINE[::2], 1 / ends)
-    rest = 1 - t
-    bump = 0.5 * (1 - np.cos(2 * np.pi * t))
-    places = curve @ np.array([t * t * (3 - 2 * t), t * rest * rest, -t * t * rest, bump])
-    slopes = curve @ _weigh_slopes(t)
-    x, y = start[:2, None] + places
-    return np.column_stack([x, y, np.arctan2(slopes[1], slopes[0])])
-
-
-def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Return the cubic Hermite spline through (x, y) with given slopes at places (n,).
-
-    scipy has this spline, but importing scipy.interpolate takes a tenth of the start time of a
-    server.
-    """
-    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
-    width, rise = x[i + 1] - x[i], y[i + 1] - y[i]
-    s = (at - x[i]) / width
-    first, last = slopes[i] * width - rise, rise - slopes[i + 1] * width
-    return np.asarray(y[i] + s * rise + s * (1 - s) * ((1 - s) * first + s * last))
-
-
-def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
-    """Sample the Dubins paths that are not much longer than the shortest one."""
-    paths = dubins_paths(start, goal, min_radius, waypoint_spacing, count)
-    longest = _LONG_WAY_ROUND * path_length(paths[0])
-    return [path for path in paths if path_length(path) <= longest]
-
-
-def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Replace the ends of a path by the exact start and goal, which removes rounding errors."""
-    path[0], path[-1] = start, goal
-    path[:, 2] = wrap(path[:, 2])
-    return path
+    x, y = (np.interp(marks, driven, values) for values in places.T)
+    return np.column_stack([x, y, np.interp(marks, middles, yaw)])
 
 
 def check_pose(name: str, pose) -> np.ndarray:

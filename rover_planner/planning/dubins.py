@@ -108,30 +108,19 @@ def drive_word(start, word, pieces, radius, waypoint_spacing):
     ends = np.concatenate([[0.0], np.cumsum(pieces)])
     steps = count_steps(ends[-1] * radius, waypoint_spacing)
     driven = np.linspace(0.0, ends[-1], steps + 1)
-    x, y, yaw = np.zeros(steps + 1), np.zeros(steps + 1), np.zeros(steps + 1)
-    x0, y0, yaw0 = 0.0, 0.0, start[2]
-    for k, letter in enumerate(word):
-        here = (driven >= ends[k]) if k == 2 else (driven >= ends[k]) & (driven < ends[k + 1])
-        x[here], y[here], yaw[here] = _advance(x0, y0, yaw0, _TURN[letter], driven[here] - ends[k])
-        x0, y0, yaw0 = _advance(x0, y0, yaw0, _TURN[letter], pieces[k])
+    x, y, yaw = 0.0, 0.0, start[2]
+    for letter, begin, piece in zip(word, ends[:-1], pieces, strict=True):
+        along = np.clip(driven - begin, 0.0, piece)
+        half = 0.5 * _TURN[letter] * along
+        chord = along * np.sinc(half / np.pi)
+        x, y = x + chord * np.cos(yaw + half), y + chord * np.sin(yaw + half)
+        yaw = yaw + 2.0 * half
     return np.column_stack([start[0] + radius * x, start[1] + radius * y, yaw])
 
 
 def count_steps(length: float, spacing: float) -> int:
     """Return into how many steps of at most `spacing` a length is divided, both in m or rad."""
     return max(1, int(np.ceil(length / spacing - 1e-9)))
-
-
-def _advance(x, y, yaw, turn, s):
-    """Return the pose after s [radii] along a left (turn 1) or right (-1) arc or a line (0)."""
-    if turn == 0.0:
-        return x + s * np.cos(yaw), y + s * np.sin(yaw), yaw + 0.0 * s
-    after = yaw + turn * s
-    return (
-        x + turn * (np.sin(after) - np.sin(yaw)),
-        y - turn * (np.cos(after) - np.cos(yaw)),
-        after,
-    )
 
 
 def _turn(angle: Angles) -> Angles:

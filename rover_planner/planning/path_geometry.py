@@ -23,7 +23,9 @@ def distance_along(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
 
-def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+def densify(
+    poses: NDArray[np.float64], spacing: float
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Insert waypoints into a path so that neighbours are at most `spacing` apart.
 
     The given poses stay. Between them x and y are interpolated linearly and the heading turns
@@ -34,35 +36,14 @@ def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
         poses: (n, 3) x, y [m], yaw [rad].
         spacing: Largest distance between waypoints [m].
 
+    Returns:
+        The waypoints (m, 3), and the index (m,) of the given pose at or after each of them.
+
     Raises:
         PlanningError: The path would have more than MAX_WAYPOINTS.
     """
     steps = np.diff(poses, axis=0)
     steps[:, 2] = wrap(steps[:, 2])
-    counts = _count_pieces(steps, spacing)
-    segment = np.repeat(np.arange(len(steps)), counts)
-    within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
-    dense = poses[segment] + steps[segment] * (within / counts[segment])[:, None]
-    return np.vstack([dense, poses[-1:]])
-
-
-def next_given_poses(poses: NDArray[np.float64], spacing: float) -> NDArray[np.intp]:
-    """Return for each waypoint of `densify` the index of the given pose at or after it, (m,).
-
-    Raises:
-        PlanningError: As `densify`.
-    """
-    counts = _count_pieces(np.diff(poses, axis=0), spacing)
-    places = np.concatenate([[0], np.cumsum(counts)])  # of the given poses among the waypoints
-    return np.searchsorted(places, np.arange(places[-1] + 1))
-
-
-def _count_pieces(steps: NDArray[np.float64], spacing: float) -> NDArray[np.intp]:
-    """Return the number of pieces of each step (n, 3) between given poses.
-
-    Raises:
-        PlanningError: There are MAX_WAYPOINTS or more.
-    """
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     pieces = np.maximum(1.0, np.ceil(lengths / spacing - 1e-9))
     if pieces.sum() >= MAX_WAYPOINTS:
@@ -70,7 +51,11 @@ def _count_pieces(steps: NDArray[np.float64], spacing: float) -> NDArray[np.intp
             f"path is {lengths.sum():.4g} m long, which at {spacing:g} m are more than "
             f"{MAX_WAYPOINTS} waypoints; ask for a shorter one"
         )
-    return pieces.astype(np.intp)
+    counts = pieces.astype(np.intp)
+    segment = np.repeat(np.arange(len(steps)), counts)
+    within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
+    dense = poses[segment] + steps[segment] * (within / counts[segment])[:, None]
+    return np.vstack([dense, poses[-1:]]), np.append(segment + (within > 0), len(steps))
 
 
 def rings_within(

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS parts that the nodes share: quality of service, deferred work, refusals, maps."""
+"""ROS parts that the nodes share: quality of service, responses, refusals, maps."""

@@ -186,7 +186,7 @@ class Frames:
         """Return the pose of the body in the map frame by odometry; the sensors move with it.
 
         Args:
-            odometry: The message; may be one of `SensorReader`.
+            odometry: The message; may be one of `read_raw`.
             base_frame: As for `odometry_to_pose`.
 
         Returns:

@@ -14,8 +14,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
-from msg_adapters.elevation import is_same_cloud
-from msg_adapters.raw_messages import DamagedMessageError, SensorReader
+from msg_adapters.raw_messages import DamagedMessageError, read_raw
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_planner.planning.navigation.transforms import Rigid, TransformError
@@ -29,7 +28,7 @@ CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 class MapIntake(ABC):
     """Takes serialised messages, and has a map made of the latest of each type.
 
-    `prepare`, `renew` and `refuse` are called in the thread.
+    `prepare` and `refuse` are called in the thread.
     """
 
     def __init__(self, logger: RcutilsLogger, frames: Frames):
@@ -44,10 +43,9 @@ class MapIntake(ABC):
         self._logger, self._frames, self._refusals = logger, frames, RepeatLog()
         self._unplaced: tuple[str, int | None] | None = None
         self._last: tuple[bytes, type] | None = None
-        self._used: Any = None
-        self._offers: dict[type, int] = {}
+        self._waiting: dict[type, bytes] = {}
         self._pool = ThreadPoolExecutor(1, "maps")
-        self.last_job: Future[None] = self.do(self.expect_other)
+        self.last_job: Future[None] = self.do(lambda: None)
         """Last job given to the thread; it is done after all that were given before."""
 
     @abstractmethod
@@ -61,9 +59,6 @@ class MapIntake(ABC):
         Raises:
             RoverError: The message cannot be used.
         """
-
-    def renew(self, cloud: Any) -> None:  # noqa: B027, the map that is there may stay as it is
-        """Take a cloud in the map frame from which the last one differs in its stamp at most."""
 
     def describe_kept(self) -> str:
         """Return what stays where a map is refused."""
@@ -79,14 +74,14 @@ class MapIntake(ABC):
     def offer(self, message: bytes, kind: type = PointCloud2) -> None:
         """Take a serialised message; one of its type that still waits is replaced."""
         self._last = message, kind
-        self._do_latest(message, kind)
+        self._waiting[kind] = message
+        self.do(partial(self._prepare_latest, kind))
 
     def repeat(self) -> None:
         """Prepare the last message again, if there is one, such as with other settings."""
-        self.do(self.expect_other)
         last = self._last  # the thread may forget it meanwhile
         if last is not None:
-            self._do_latest(*last)
+            self.offer(*last)
 
     def retry(self) -> None:
         """Prepare the last message again if its transform has come meanwhile; call it each second.
@@ -100,14 +95,9 @@ class MapIntake(ABC):
                 self._unplaced = None
                 self.repeat()
 
-    def expect_other(self) -> None:
-        """Prepare the next message whatever it says; to be called in the thread."""
-        self._used = None
-
     def forget(self) -> None:
         """Forget the last message, because another map replaces it; call it in the thread."""
         self._last = None
-        self.expect_other()
 
     def do(self, job: Callable[[], Any]) -> Future[None]:
         """Call a function in the thread after all that was given before."""
@@ -118,31 +108,21 @@ class MapIntake(ABC):
         """End the thread after the map in work is prepared."""
         self._pool.shutdown(cancel_futures=True)
 
-    def _do_latest(self, message: bytes, kind: type) -> None:
-        number = self._offers[kind] = self._offers.get(kind, 0) + 1
-        self.do(partial(self._prepare_map, message, kind, number))
-
     def _run(self, job: Callable[[], Any]) -> None:
         try:
             job()
         except Exception as error:
             self.refuse(f"internal error: {type(error).__name__}: {error}")
 
-    def _prepare_map(self, message: bytes, kind: type, number: int) -> None:
-        if number < self._offers[kind]:
+    def _prepare_latest(self, kind: type) -> None:
+        message = self._waiting.pop(kind, None)
+        if message is None:  # it was the latest in an earlier turn
             return
         self.topic = CLOUD if kind is PointCloud2 else GRID_MAP
         self._unplaced = None
-        used, self._used = self._used, None
         try:
             read = read_message(message, kind)
-            source = self._find_source(read.header)
-            is_plain = kind is PointCloud2 and source is None
-            if is_plain and used is not None and is_same_cloud(read, used):
-                self.renew(read)
-            else:
-                self.prepare(read, source)
-            self._used = read if is_plain else None
+            self.prepare(read, self._find_source(read.header))
         except RoverError as error:
             self.refuse(str(error))
 
@@ -167,7 +147,7 @@ def read_message(message: bytes, kind: type) -> Any:
         MessageError: The bytes are no such message.
     """
     if kind is PointCloud2:
-        return SensorReader().read(message, kind)
+        return read_raw(message, kind)
     try:
         return deserialize_message(message, kind)
     except Exception as error:  # RMWError, of a module that differs between distributions

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from msg_adapters.raw_messages import SensorReader
+from msg_adapters.raw_messages import READERS, read_raw
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_planner.ros.guard import Guard
@@ -32,9 +32,9 @@ class PolledTopics:
     def __init__(self, node: Node, guard: Guard):
         """Begin without topics; `guard` takes unexpected errors."""
         self._node, self._guard, self._group = node, guard, _Apart()
-        self._topics: list[tuple[Subscription, Callable[[], bool], Refuse]] = []
+        self._topics: list[tuple[Subscription, Refuse]] = []
         self._polled = time.monotonic()
-        self._reader, self._refusals = SensorReader(), RepeatLog()
+        self._refusals = RepeatLog()
 
     def subscribe(
         self,
@@ -42,31 +42,28 @@ class PolledTopics:
         name: str,
         take: Take,
         qos: QoSProfile,
-        is_due: Callable[[], bool] = lambda: True,
         refuse: Refuse | None = None,
     ) -> None:
         """Subscribe to a topic.
 
         Args:
-            kind: Type of the messages; those of sensors are read by a `SensorReader`.
+            kind: Type of the messages; those of READERS are read by `read_raw`.
             name: Name of the topic.
             take: Called with each message.
             qos: The profile; of more messages than its depth the last ones are read.
-            is_due: Whether it is to be read at all now.
             refuse: Called if `take` raises; None has that logged.
         """
         topic = self._node.create_subscription(
-            kind, name, take, qos, callback_group=self._group, raw=self._reader.reads(kind)
+            kind, name, take, qos, callback_group=self._group, raw=kind in READERS
         )
-        self._topics.append((topic, is_due, refuse or self._refuse))
+        self._topics.append((topic, refuse or self._refuse))
 
     def poll(self) -> None:
         """Read all that has come since the last time, in the order of its arrival."""
         before, self._polled = self._polled, time.monotonic()
         arrived = [
             (*found, topic, refuse)
-            for topic, is_due, refuse in self._topics
-            if is_due()
+            for topic, refuse in self._topics
             for found in self._take(topic)
         ]
         for at, found, topic, refuse in sorted(arrived, key=lambda one: one[0]):
@@ -74,7 +71,7 @@ class PolledTopics:
             age, now = (time.time_ns() - at) / NANOSECONDS, time.monotonic()
             arrival = now - min(max(age, 0.0), now - before)
             try:
-                message = self._reader.read(found, topic.msg_type) if topic.raw else found
+                message = read_raw(found, topic.msg_type) if topic.raw else found
                 topic.callback(message, arrival)
             except Exception as error:
                 refuse(topic.topic, error, arrival)

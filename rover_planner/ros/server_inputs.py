@@ -86,7 +86,7 @@ class ServerInputs:
         self.service.take_joints(self.joint_names.positions(state, heard))
 
     def take_odometry(self, odometry: Any) -> None:
-        """Take the pose of the robot, as `SensorReader` reads it, if it was measured anew.
+        """Take the pose of the robot, as `read_raw` reads it, if it was measured anew.
 
         Raises:
             RoverError: A value is wrong, or the frame is not known.

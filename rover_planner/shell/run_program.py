@@ -94,6 +94,19 @@ def end_as_by_ctrl_c() -> Iterator[None]:
             signal.signal(one, signal.SIG_DFL)
 
 
+@contextlib.contextmanager
+def ctrl_c_later() -> Iterator[None]:
+    """Let Ctrl-C wait until the end of the block.
+
+    Threads and processes that start in it, and all that these start, never see it.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def end_with(name: str, code: int, text: str) -> int:
     """Print in one line on stderr why a program ends; return the exit code."""
     with contextlib.suppress(OSError):  # stderr itself may be closed or full

@@ -12,11 +12,10 @@ from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import MUJOCO, RoverSimulatorParameters
-from rover_planner.simulator.path_follower import PathFollower
+from rover_planner.simulator.path_follower import MAX_TRIES, STUCK_TIME, PathFollower, SecondTry
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import look
-from rover_planner.simulator.second_try import MAX_TRIES, STUCK_TIME, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 if TYPE_CHECKING:

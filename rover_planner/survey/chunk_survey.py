@@ -15,7 +15,7 @@ from rover_physics.terrain.ground import BLOCK
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layout import Box, Index
 from rover_planner.survey.request import SurveyRequest
-from rover_planner.survey.store import StoreNotes, SurveyStore, is_refusal
+from rover_planner.survey.store import StoreNotes, SurveyStore
 from rover_planner.survey.tile_survey import BATCH, survey_tile
 
 BYTES_OF_CELL = 60
@@ -36,44 +36,27 @@ class SurveyJob:
     """Version of the model."""
 
 
-@dataclass(frozen=True)
-class ChunkReport:
-    """The report of a task on its chunk."""
-
-    poses: int = 0
-    """Number of poses."""
-    refusal: str = ""
-    """Reason of the system for not writing, empty if it has written."""
-
-
-def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
-    """Survey a chunk and write it into the store.
+def survey_chunk(job: SurveyJob, chunk: Index) -> int:
+    """Survey a chunk and write it into the store; return the number of its poses.
 
     Raises:
         PlanningError: The worker has another version of the model.
-        RoverError, OSError: The map cannot be read, or not computed with.
+        RoverError, OSError: The map cannot be read, or not computed with, or the chunk cannot be
+            written.
     """
     if job.version != rover_physics.__version__:
         raise PlanningError(
             f"the worker has version {rover_physics.__version__}, the survey {job.version}"
         )
     numba.set_num_threads(1)  # a worker is one core
-    began, store, wrong = time.perf_counter(), SurveyStore(job.store), ""
+    began, store = time.perf_counter(), SurveyStore(job.store)
     try:
         layers = compute_chunk(job.request, store, chunk)
     except PlanningError as error:
-        wrong = str(error)
-    if wrong:  # without its causes, as GDAL's errors cannot be sent to the client
-        raise PlanningError(wrong)
-    poses = layers["worst_class"].size * job.request.headings
-    seconds = time.perf_counter() - began
-    try:
-        store.write(chunk, layers, seconds)
-    except OSError as error:
-        if not is_refusal(error):
-            raise
-        return ChunkReport(refusal=error.strerror or str(error))
-    return ChunkReport(poses)
+        error.__cause__ = error.__context__ = None  # GDAL's errors cannot be sent to the client
+        raise
+    store.write(chunk, layers, time.perf_counter() - began)
+    return layers["worst_class"].size * job.request.headings
 
 
 def compute_chunk(

@@ -8,8 +8,7 @@ from typing import Any
 from rover_physics.files.user_file import writing
 from rover_physics.files.validation import errors_of, show_file
 from rover_planner.errors import PlanningError
-from rover_planner.survey.geotiff import BAND, import_rasterio
-from rover_planner.survey.map_source import MapFrame
+from rover_planner.survey.map_source import BAND, MapFrame, import_rasterio
 from rover_planner.survey.store import SurveyStore, force_to_disk
 
 

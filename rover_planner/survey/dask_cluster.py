@@ -3,13 +3,13 @@
 
 import contextlib
 import logging
-import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from typing import Any
 
 from rover_planner.errors import PlanningError
+from rover_planner.shell.run_program import ctrl_c_later
 from rover_planner.survey.chunk_survey import SurveyJob, estimate_memory
 from rover_planner.survey.store import StoreNotes
 
@@ -33,8 +33,6 @@ SETTINGS = {
 }
 """Settings of Dask's processes on this machine. What they do at rest counts as much as how they
 treat tasks, as there are few of those."""
-NOISY = ("distributed", "tornado", "asyncio")
-"""Beginnings of the names of the logs that are silenced."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,8 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
     asked = SETTINGS | {"distributed.comm.timeouts.connect": CONNECT_TIME}
     with contextlib.ExitStack() as stack:
         stack.enter_context(dask.config.set(asked))
-        stack.enter_context(_silent_logs())
+        stack.callback(logging.disable, logging.root.manager.disable)
+        logging.disable()  # the command tells in one line what Dask would tell on stderr
         if settings.scheduler is not None:
             try:
                 client = Client(settings.scheduler, timeout=CONNECT_TIME)
@@ -108,7 +107,8 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
                 ) from None
             yield stack.enter_context(client)
             return
-        with _ctrl_c_later():
+        resource_tracker.ensure_running()  # it unblocks the signal in the thread that starts it
+        with ctrl_c_later():  # a terminal sends it to workers, too, which would print traces
             cluster = LocalCluster(
                 n_workers=settings.workers,
                 threads_per_worker=1,
@@ -119,38 +119,6 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
             )
             stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
-
-
-@contextlib.contextmanager
-def _ctrl_c_later() -> Iterator[None]:
-    """Let Ctrl-C wait until the end of the block.
-
-    Threads and processes that start in it, and all that these start, never see it: a terminal
-    sends it to workers, too, which would print traces.
-    """
-    resource_tracker.ensure_running()  # it unblocks the signal in the thread that starts it
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextlib.contextmanager
-def _silent_logs() -> Iterator[None]:
-    """Keep Dask from telling on stderr what the command tells in one line.
-
-    Its settings of logs count only when it is imported.
-    """
-    known = [name for name in logging.root.manager.loggerDict if name.startswith(NOISY)]
-    levels = {name: logging.getLogger(name).level for name in known}
-    for name in known:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for name, level in levels.items():
-            logging.getLogger(name).setLevel(level)
 
 
 def check_machine(notes: StoreNotes, settings: ClusterSettings) -> None:

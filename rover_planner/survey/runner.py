@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rover_planner.errors import PlanningError
-from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, survey_chunk
+from rover_planner.survey.chunk_survey import SurveyJob, survey_chunk
 from rover_planner.survey.dask_cluster import (
     ATTEMPTS,
     ClusterSettings,
@@ -19,7 +19,7 @@ from rover_planner.survey.dask_cluster import (
     wait_for_workers,
 )
 from rover_planner.survey.layout import Index
-from rover_planner.survey.store import SurveyStore
+from rover_planner.survey.store import SurveyStore, is_refusal
 
 AHEAD = 3
 """Tasks that are submitted at a time, for each thread of the cluster: enough that no worker waits,
@@ -47,8 +47,8 @@ def run_survey(
     job: SurveyJob,
     chunks: Iterable[Index],
     settings: ClusterSettings,
-    on_chunk: Callable[[ChunkReport], object] = lambda report: None,
-    task: Callable[[SurveyJob, Index], ChunkReport] = survey_chunk,
+    on_chunk: Callable[[int], object] = lambda poses: None,
+    task: Callable[[SurveyJob, Index], int] = survey_chunk,
 ) -> SurveyOutcome:
     """Survey chunks on a cluster.
 
@@ -56,7 +56,7 @@ def run_survey(
         job: What to do.
         chunks: The chunks to survey.
         settings: Where.
-        on_chunk: Called after each chunk that is finished.
+        on_chunk: Called with the number of poses of each chunk that is finished.
         task: Work of a task.
 
     Returns:
@@ -139,13 +139,13 @@ class _Run:
         """Note what became of a chunk; raise PlanningError if the others will fail as it did."""
         error = future.exception()  # waits for the end
         if error is None:
-            report = future.result()
-            if report.refusal:
-                told = f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}"
-                raise PlanningError(told)
+            poses = future.result()
             self._outcome.done += 1
-            self._outcome.poses += report.poses
-            self._on_chunk(report)
+            self._outcome.poses += poses
+            self._on_chunk(poses)
+        elif isinstance(error, OSError) and is_refusal(error):
+            told = f"{self._job.store}: cannot be written: {error.strerror}; {KEPT}"
+            raise PlanningError(told)
         elif type(error).__name__ in ("NoWorkerError", "NoValidWorkerError"):
             raise PlanningError(ALONE)
         elif _is_killed(error):

@@ -19,10 +19,9 @@ from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
-from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import NOT_SURVEYED, list_layers, number_limits
 from rover_planner.survey.layout import Index, SurveyLayout
-from rover_planner.survey.map_source import MAP, MapFrame, StoredMap, keep_map
+from rover_planner.survey.map_source import MAP, GeoTiffMap, MapFrame, StoredMap, keep_map
 
 FORMAT = 2
 """Version of the store's format: 2 writes all files of a chunk, also those without values."""
@@ -189,12 +188,8 @@ class SurveyStore:
         Raises:
             PlanningError: It has changed, or cannot be read.
         """
-        source = self.open_map()
-        changed = (
-            isinstance(source, GeoTiffMap)
-            and source.hash_content() != self.notes.description["map"]
-        )
-        if changed:
+        source, kept = self.open_map(), self.notes.description["map"]
+        if isinstance(source, GeoTiffMap) and source.hash_content() != kept:
             raise PlanningError(
                 f"{show_file(self.notes.map_file)} has changed since {show_file(self.path)} was "
                 "made"
@@ -324,7 +319,7 @@ def force_to_disk(path: Path, root: Path) -> None:
 
 
 def is_refusal(error: OSError) -> bool:
-    """Return whether the system refuses to write, so that another attempt is of no use."""
+    """Return whether the system refuses to write: then so it does for other chunks."""
     refusals = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG)
     return error.errno in refusals
 

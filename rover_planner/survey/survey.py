@@ -14,10 +14,9 @@ from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob
 from rover_planner.survey.dask_cluster import ClusterSettings, check_machine
-from rover_planner.survey.geotiff import BAND, GeoTiffMap, is_geotiff
 from rover_planner.survey.layers import NOT_SURVEYED
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
-from rover_planner.survey.map_source import MapFrame
+from rover_planner.survey.map_source import BAND, GeoTiffMap, MapFrame, is_geotiff
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import StoreNotes, SurveyStore, create_store
 

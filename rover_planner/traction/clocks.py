@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judges the clock of header stamps: one that was stepped or, if it is simulated, has stopped."""
 
-NANOSECONDS = 1_000_000_000
+from msg_adapters.stamps import NANOSECONDS
+
 MAX_STEP = 0.1
 """Difference of the system clock from the monotonic clock that counts as a step [s]; a clock that
 is only slewed gains 0.5 ms a second at most."""

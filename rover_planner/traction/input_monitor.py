@@ -9,8 +9,8 @@ from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from msg_adapters.stamps import NANOSECONDS
 from rover_planner.errors import PlanningError
-from rover_planner.traction.clocks import NANOSECONDS
 
 NEVER = -math.inf
 """Time of an input that has not arrived yet [s]."""

@@ -53,27 +53,29 @@ class TractionSupervisor:
         """True if an operator has enabled the rover, and no emergency stop was pressed since."""
         self.emergency_stop = False
         """True if the emergency stop is pressed."""
-        self._hold = self._create_hold()
+        self._hold: WheelServos | None = None
+        """The servos that hold the wheels now; None if none do."""
         self._fault, self._fault_end = "", -math.inf
         self._stall = StallWatch()
         self._tripped = ""
         self._last_time: float | None = None
         self._standing = 0.0
-        self._held = False
         self._rest_torques: Floats | None = None
 
     def configure(self, settings: TractionSettings) -> None:
         """Take new settings between two updates; torques go on from the last ones."""
         self.service.settings = settings
-        integral, self._hold = self._hold.integral, self._create_hold()
-        self._hold.integral = integral
+        if self._hold is not None:
+            self._hold = self._create_hold(self._hold.integral)
 
-    def _create_hold(self) -> WheelServos:
-        """Return the servos that hold the wheels at rest."""
+    def _create_hold(self, torques: Floats) -> WheelServos:
+        """Return servos that hold the wheels at rest and go on from torques (6,) [N m]."""
         rover, weight = self.service.settings.rover, self.service.weight
         inertia = weight / rover.gravity * rover.wheel.radius**2 / WHEEL_COUNT
         most = self.service.settings.max_torque
-        return WheelServos(HOLD_RATE_GAIN * inertia, HOLD_ANGLE_GAIN * inertia, most)
+        servos = WheelServos(HOLD_RATE_GAIN * inertia, HOLD_ANGLE_GAIN * inertia, most)
+        servos.start(torques)
+        return servos
 
     def set_enabled(self, enabled: bool) -> tuple[bool, str]:
         """Enable or disable; return whether that was done, and what holds now."""
@@ -109,7 +111,7 @@ class TractionSupervisor:
         if self._rest_torques is not None:
             self.service.start_from(self._rest_torques)
             self._rest_torques = None
-        self._held = False
+        self._hold = None
         command = self.service.drive(now)
         if command.fault:
             self._latch(command.fault, now)
@@ -118,7 +120,7 @@ class TractionSupervisor:
 
     def fail(self, fault: str) -> TractionCommand:
         """Return zero torques and the brake, after an internal error."""
-        self._held, self._rest_torques = False, None
+        self._hold = self._rest_torques = None
         self.trip(fault)
         return replace(self.service.rest(fault), brake=True)
 
@@ -167,17 +169,16 @@ class TractionSupervisor:
         if policy == HOLD and not joints_unknown:
             torques, expiry = self._hold_wheels(duration), self.service.joints.wheel_time + timeout
         else:
-            self._held = False
+            self._hold = None
         self._rest_torques = torques
         return TractionCommand(torques, fault, state=state, brake=brake, expiry=expiry)
 
     def _hold_wheels(self, duration: float) -> Floats:
         """Return the torques (6,) [N m] that stop and hold the wheels."""
         service, most = self.service, self.service.settings.max_torque
-        if not self._held:
+        if self._hold is None:
             radius = service.settings.rover.wheel.radius
             needed = -(service.weight * radius / WHEEL_COUNT) * math.sin(service.pitch)
-            self._hold.start(np.full(WHEEL_COUNT, needed))
-        self._held = True
+            self._hold = self._create_hold(np.full(WHEEL_COUNT, needed))
         torques = self._hold.update(-service.joints.wheel_rates, min(duration, MAX_STEP))
         return np.minimum(np.maximum(torques, -most), most)

@@ -178,11 +178,6 @@ class TractionService:
         return None if self._finder is None else self._finder.terrain
 
     @property
-    def drives(self) -> bool:
-        """True if the last update did not rest."""
-        return self._last is not None
-
-    @property
     def climbs(self) -> bool:
         """True if the suspension shows that the rover climbs, at the last update."""
         return self._slip.detector.climbs

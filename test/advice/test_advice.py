@@ -191,8 +191,8 @@ def test_a_piece_fails_only_where_the_path_does():
     case = replace(refused_by(rock_left, policy="servo"), poses=bend_path(STRAIGHT, 0.1))
     refused = case.judge()
     for place in range(refused.place + 1):
-        rows = refused.rows_around(place)
-        assert case.fails_at(place, rows, by_chance=False) == (place == refused.place), place
+        there = replace(refused, verdict=replace(refused.verdict, first_failure=place))
+        assert there.fails_alike(case) == (place == refused.place), place
 
 
 def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):

@@ -31,7 +31,7 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 with stopping_children() as children:
     child = ChildProcess("polite", (), os.environ, Path(sys.argv[1]) / "log")
     children.append(child)
-    next(child.lines(lambda: None))
+    next(child.lines())
     print(child._process.pid, flush=True)
     while True:  # a signal that comes just before a sleep does not end this sleep
         time.sleep(0.1)
@@ -53,7 +53,7 @@ def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
     with stopping_children() as children:
         child = ChildProcess("stubborn", (), environment, tmp_path / "log")
         children.append(child)
-        inner = int(next(child.lines(lambda: None)))
+        inner = int(next(child.lines()))
         assert is_running(inner)
         assert child.running
     assert not child.running
@@ -63,7 +63,7 @@ def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
 
 def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environment):
     child = ChildProcess("failing", (), environment, tmp_path / "log")
-    assert list(child.lines(lambda: None)) == []
+    assert list(child.lines()) == []
     wait_until(lambda: not child.running, "its end")
     assert child.exit_code == 1
     assert child.last_line() == "no luck today"

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rover_planner.demo.answers_picture import draw_answers
 from rover_planner.demo.goals import Goal
-from rover_planner.figures.path_picture import _draw_uses, draw_path
+from rover_planner.figures.path_pictures import _draw_uses, draw_path
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path

@@ -149,7 +149,7 @@ def test_a_long_path_that_is_written_in_parts_gives_the_same_file(files, monkeyp
     if "--sigmas" in words:
         make_uncertain(files / "terrain.npz")
     assert main([*predict_arguments(files), *words]) == 0
-    monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
+    monkeypatch.setattr("rover_planner.command.prediction_files.MAX_IN_MEMORY", 0)
     monkeypatch.setattr("rover_planner.command.prediction_files.BLOCK", 7)
     monkeypatch.setattr("rover_physics.prediction.sweep.PART", 10)
     assert main([*predict_arguments(files, out="parts.npz"), *words]) == 0
@@ -163,7 +163,7 @@ def test_a_long_path_that_is_written_in_parts_gives_the_same_file(files, monkeyp
 
 
 def test_a_disk_that_is_full_is_one_line_and_leaves_no_temporary_file(files, monkeypatch, capfd):
-    monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
+    monkeypatch.setattr("rover_planner.command.prediction_files.MAX_IN_MEMORY", 0)
     (files / "out.npz").symlink_to("/dev/full")
     assert_refused(capfd, main(predict_arguments(files)), "No space left on device")
     assert [path.name for path in files.iterdir() if path.name.startswith(".")] == []
@@ -178,7 +178,7 @@ def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monke
     bends = [0.0, 1.0, -1.0, np.inf, -np.inf]
     np.savez(files / "poses.npz", poses=poses_at(np.linspace(1.0, 3.0, 5), 2.0), curvature=bends)
     assert main(predict_arguments(files)) == 0
-    monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 2)
+    monkeypatch.setattr("rover_planner.command.prediction_files.MAX_IN_MEMORY", 2)
     assert main(predict_arguments(files, out="parts.npz")) == 0
     with np.load(files / "out.npz") as out, np.load(files / "parts.npz") as parts:
         for name in out.files:

@@ -9,8 +9,7 @@ import pytest
 from rover_physics import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
-from rover_planner.maps.changes import find_changes
-from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto
+from rover_planner.maps.layers import LOADED, UNKNOWN, find_changes, lay_onto
 from rover_planner.parameters.traverse_server import SUREST, TraverseServerParameters
 from rover_planner.planning.answering.living_map import LivingMap
 from support.grounds import make_terrain, waves

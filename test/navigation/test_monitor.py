@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_planner.planning.answering.judgement import SuspensionReport
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
@@ -20,7 +21,6 @@ from rover_planner.planning.navigation.monitor import (
     describe_watch,
 )
 from rover_planner.planning.navigation.watched_path import USUAL_RADIUS, WatchedPath
-from rover_planner.planning.verdict_report import SuspensionReport
 from support.grounds import make_terrain, wall_at, waves, with_std
 from support.services import make_service
 

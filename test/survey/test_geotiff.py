@@ -12,10 +12,9 @@ pytest.importorskip("zarr", reason="install the extra survey")
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.cog import write_cog, write_layers
-from rover_planner.survey.geotiff import GeoTiffMap
-from rover_planner.survey.map_source import MapFrame
+from rover_planner.survey.map_source import GeoTiffMap, MapFrame
 from rover_planner.survey.survey import prepare_survey
-from rover_planner.viewer.state.survey_layers import load_map
+from rover_planner.viewer.state.layers import load_map
 from support.command_line import assert_refused
 from support.survey_maps import compute_here, make_request, make_rough_map
 

@@ -22,18 +22,19 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.shell.run_program import end_as_by_ctrl_c
 from rover_planner.survey import dask_cluster
-from rover_planner.survey.chunk_survey import ChunkReport, survey_chunk
+from rover_planner.survey.chunk_survey import survey_chunk
 from rover_planner.survey.cog import write_layers
 from rover_planner.survey.dask_cluster import ClusterSettings, check_workers, open_client
 from rover_planner.survey.layout import Index
 from rover_planner.survey.runner import run_survey
-from rover_planner.survey.store import create_store
+from rover_planner.survey.store import create_store, is_refusal
 from rover_planner.survey.survey import prepare_survey
 from support.command_line import assert_refused
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
     fail_on_one,
+    fill_the_disk,
     layers_of,
     make_request,
     make_rough_map,
@@ -108,9 +109,7 @@ def test_a_chunk_that_fails_is_named_and_the_rest_stands(tmp_path, scheduler):
     again = prepare_survey(make_request(step=4), str(tmp_path / "map.npz"), tmp_path / "out")
     assert again.chunks == [(0, 1)]
     with pytest.raises(PlanningError, match="cannot be written: No room; finished chunks are ke"):
-        run_survey(
-            again.job, again.chunks, settings, task=lambda *_: ChunkReport(refusal="No room")
-        )
+        run_survey(again.job, again.chunks, settings, task=fill_the_disk)
 
 
 def test_a_survey_ends_when_no_worker_is_left(tmp_path):
@@ -145,9 +144,9 @@ def small_files(most: int) -> Iterator[None]:
 def test_on_a_full_disk_a_chunk_is_refused_and_what_is_there_is_whole(tmp_path):
     rasterio = pytest.importorskip("rasterio", reason="install the extra survey")
     prepared = prepare_here(tmp_path, make_rough_map(64, 64), make_request(headings=1))
-    with small_files(1500):
-        report = survey_chunk(prepared.job, (0, 0))
-    assert report.refusal == "File too large" and not prepared.store.find_finished()
+    with small_files(1500), pytest.raises(OSError, match="File too large") as error:
+        survey_chunk(prepared.job, (0, 0))
+    assert is_refusal(error.value) and not prepared.store.find_finished()
     compute_here(prepared)
     refused = pytest.raises(PlanningError, match=r"\.tif: cannot be written: File too large")
     with small_files(10_000), refused:

@@ -15,7 +15,7 @@ from rover_physics.traversability.pose_classes import IMPASSABLE
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS
 from rover_planner.viewer.state.colours import UNKNOWN
-from rover_planner.viewer.state.survey_layers import CLASS, ShownSurvey, load_map
+from rover_planner.viewer.state.layers import CLASS, ShownSurvey, load_map
 from support.rovers import LSR1
 from support.survey_maps import make_request, survey_here
 

@@ -10,7 +10,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.advice import PROMISED, Advised, apply_remedy, describe_advice
+from rover_planner.viewer.documents.advice import PROMISED, apply_remedy, describe_advice
 from rover_planner.viewer.pages.page import Page
 from support.grounds import rock_left
 from support.viewer.sessions import LSR1, ask, session_on, wait_for_rest
@@ -72,16 +72,16 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
 
 
 def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
-    path, since = session_on(rock_left, *ENDS, OPTIONS).shown.path, 1000.0
+    path, at = session_on(rock_left, *ENDS, OPTIONS).shown.path, 1000.0
     growing = grow_advice(case_of(path.scenario.site, path.poses))
     none, some = next(growing), next(one for one in growing if one.remedies)
-    first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))
-    told = describe_advice(first, True, since + 0.5 * PROMISED)
+    last = replace(some, complete=True)
+    told = describe_advice(none, at, True, at + 0.5 * PROMISED)
     assert told["words"] == "tried: nothing yet" and not told["can_ask"]
-    for advised, found in ((first, "nothing"), (last, str(len(last.remedies)))):
-        words = describe_advice(advised, True, since + PROMISED)["words"]
+    for advice, found in ((none, "nothing"), (last, str(len(last.remedies + last.others)))):
+        words = describe_advice(advice, at, True, at + PROMISED)["words"]
         assert words.startswith(f"{found} found so far; the search goes on, tried: ")
-    stopped, ended = (describe_advice(one, False, since) for one in (first, last))
+    stopped, ended = (describe_advice(one, at, False, at) for one in (none, last))
     assert stopped["can_ask"]
     assert stopped["words"] == "the search was stopped before it found anything"
     assert not ended["can_ask"] and ended["words"] == "" and ended["rows"]
@@ -92,7 +92,7 @@ def test_a_search_that_is_stopped_tells_so_and_one_ends_when_nobody_looks_at_its
     page.hear({"ask": "cancel"})
     words = "the search was stopped before it found anything"
     wait_until(lambda: page.channel.parts["advice"]["words"] == words, "the words")
-    assert page.channel.parts["advice"]["can_ask"] and page._advised.advice is None
+    assert page.channel.parts["advice"]["can_ask"] and page._advised is None
     page.hear({"ask": "advise"})
     wait_until(lambda: page._advice.progress, "the search")
     page.hear({"ask": "value", "label": "friction [-]", "value": 0.7})

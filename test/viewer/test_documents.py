@@ -279,7 +279,7 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
 
 def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():
     session = session_on(ramp)
-    sliders = paths.describe_sliders(paths.list_sliders(LSR1), session.wanted)
+    sliders = paths.describe_sliders(session.wanted)
     labels = [one[0] for part in sliders for one in part["sliders"]]
     assert labels == list(paths.read_values(session.wanted))
     before = session.shown.path

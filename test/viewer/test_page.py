@@ -196,6 +196,7 @@ def test_a_number_of_a_slider_is_judged_and_the_reason_of_a_refused_one_stays_on
     visitor.press("Reset")
     wait_until(lambda: session.shown.scenario.rover == LSR1, "the loaded rover")
     wait_for_rest(page)
+    assert visitor.box(label).get_attribute("max") == "25"  # it can be dragged back
 
 
 def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the_click(

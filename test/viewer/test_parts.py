@@ -12,6 +12,7 @@ import pytest
 
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_planner.planning.search.site import Site
 from rover_planner.viewer.state import colours, layers
 from rover_planner.viewer.state.background_work import Inbox
 from rover_planner.viewer.state.drive import Playback, Trajectory
@@ -144,7 +145,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     ground = make_terrain(lambda x, y: gap(x, y) + 0.3 * x)
     at = np.array([-1.0, 0.75]), np.array([0.0])
     tilt, every = (
-        layers.predict_use(layers.LayerRequest(LSR1, ground, layers.Colouring(layer)), at)[0]
+        layers.predict_use(Site(LSR1, ground), layers.Colouring(layer), at)[0]
         for layer in ("use of tilt", "use of all limits")
     )
     pose = [[-1.0, 0.0, 0.0]]
@@ -155,7 +156,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     assert np.isnan([tilt[1], every[1]]).all()  # unknown ground
     steep = make_terrain(lambda x, y: x)
     grid, how = layers.thin(steep), layers.Colouring("use of tilt")
-    found = layers.colour_limit(layers.LayerRequest(LSR1, steep, how), grid)
+    found = layers.colour_limit(Site(LSR1, steep), how, grid)
     picture = ground_mesh.draw_picture(grid, found)
     assert np.median(picture[..., 0]) > np.median(picture[..., 2])  # beyond it is vermillion
     assert found.legend["keys"][0] == ("hatched", "beyond the limit")

@@ -92,27 +92,14 @@ def test_another_site_gets_no_channel(page):
 # What is told and drawn.
 
 
-def test_a_slider_goes_to_its_ends_which_include_a_number_or_an_angle_that_was_set_elsewhere(page):
-    session, arm = page.session, LSR1.manipulator
-
-    def ends(label: str) -> list[float]:
-        rows = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
-        return rows[label][1:3]
-
-    for label in (FRICTION, "arm_yaw [rad]"):
-        page.hear({"ask": "value", "label": label, "value": 9999.0})
-        most = ends(label)[1]
-        wait_until(lambda at=label, most=most: told(page, "values")[at] == most, label)
-    most = 1.5 * ends(FRICTION)[1]
-    slippery = replace(LSR1, friction=most)
-    ask(page, lambda: session.take_change(replace(session.wanted, rover=slippery)))
-    assert ends(FRICTION)[1] == most
-    set_friction(page, 0.9 * most)  # as it was dragged to, and it can be dragged back
-    assert ends(FRICTION)[1] == most
-    turned = replace(arm, joint_limits=None, stowed=(-4.0, *arm.stowed[1:]))
-    ask(page, lambda: session.take_rover(replace(LSR1, manipulator=turned)))
-    assert ends("arm_yaw [rad]") == [-4.0, FULL_TURN]
-    assert ends(FRICTION)[1] < most
+def test_numbers_and_joints_have_sliders_and_a_joint_without_limits_goes_all_around(page):
+    for label, value in ((FRICTION, 0.9), ("arm_yaw [rad]", 1.0)):
+        page.hear({"ask": "value", "label": label, "value": value})
+        wait_until(lambda at=label, to=value: told(page, "values")[at] == to, label)
+    free = replace(LSR1, manipulator=replace(LSR1.manipulator, joint_limits=None))
+    ask(page, lambda: page.session.take_rover(free))
+    rows = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
+    assert rows["arm_yaw [rad]"][1:3] == [-FULL_TURN, FULL_TURN]
 
 
 def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
@@ -263,13 +250,13 @@ def test_lines_have_the_colours_of_their_strands_and_their_node_stays_until_it_i
 def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
     overlay = page.scene.paths
     trail = np.array([[0.0, 0.0, 0.5], [0.1, 0.0, 0.0], [0.2, 0.0, 1.0]])
-    for known, count in ((None, 0), (trail[:1], 0), (trail, 2)):
+    for known, count in ((trail[:0], 0), (trail[:1], 0), (trail, 2)):
         overlay.show_trail(known)
         node = page.scene.canvas.nodes.get("/lines/trail")
         assert (0 if node is None else len(node.points)) == count
     low, high = node.colors[:, 0].tolist()
     assert low[2] > low[0] and high[0] > high[2]
-    overlay.show_trail(None)
+    overlay.show_trail(trail[:0])
 
 
 # Errors.

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The subscriptions of the traction controller: checks messages, prepares maps for its service."""
 
-import math
 import time
 from typing import Any
 
@@ -43,8 +42,6 @@ ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
 """Joints whose positions are read; a rover has the steering joints of its steered wheels."""
 LONGEST_PERIOD = 0.1
 """Time between two readings of joint states, at most [s]."""
-REST_PERIOD = 0.1
-"""Time between two readings of odometry by a rover at rest [s]."""
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 
 
@@ -70,7 +67,6 @@ class TractionInputs:
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
-        self._odometry_read = -math.inf
         self._twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         self._log = TransitionLog(node.get_logger())
         self._subscribe()
@@ -90,16 +86,8 @@ class TractionInputs:
         hear(JointState, JOINT_STATES, self._take_joints, joints, refuse=self._refuse)
         hear(Imu, IMU, self._take_imu, newest, refuse=self._refuse)
         hear(self._twist, CMD_VEL, self._take_command, newest, refuse=self._refuse)
-        hear(Odometry, ODOMETRY, self._take_odometry, newest, self._needs_odometry, self._refuse)
+        hear(Odometry, ODOMETRY, self._take_odometry, newest, refuse=self._refuse)
         hear(Bool, STOP, self._take_stop, topic_qos(), refuse=self._refuse)
-
-    def _needs_odometry(self) -> bool:
-        """Return whether odometry is to be read: it takes longest, and at rest nothing uses it."""
-        now = time.monotonic()
-        if not self._service.drives and now - self._odometry_read < REST_PERIOD:
-            return False
-        self._odometry_read = now
-        return True
 
     def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
         types = {

@@ -15,12 +15,12 @@ from rover_physics.numerics.arrays import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
-from rover_planner.maps.changes import LAYERS
 from rover_planner.maps.layers import (
     CONTACT,
     FIRST_NAMES,
     FOOTPRINT,
     LASTING,
+    LAYERS,
     LOADED,
     UNKNOWN,
     CellSources,

@@ -10,41 +10,36 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.traversability.reach import ReachAnswer, judge_reach
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.parameters.traverse_server import USE
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import (
+    LEARNED,
+    TOLD,
+    IdentityReport,
+    PathJudgement,
+    refusal,
+)
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
-from rover_planner.planning.verdict_report import LEARNED, TOLD, IdentityReport
 
 
 @dataclass(frozen=True, eq=False)
 class PathQuestion:
     """Whether there is a path from start to goal."""
 
-    start: ArrayLike
+    start: ArrayLike = ()
     """(3,) x, y [m], yaw [rad] of the body, map frame."""
-    goal: ArrayLike
+    goal: ArrayLike = ()
     """(3,) x, y [m], yaw [rad] of the body, map frame."""
     tolerance: float = 0.0
     """As in `Snapshot.answer` [m]."""
     hash: str = ""
     """Hash of the request; empty if it has none."""
+    refusal: str = ""
+    """Why the request cannot be read, which is the answer then; empty if it can."""
 
     def judge(self, snapshot: Snapshot) -> PathJudgement:
         """Find a path; errors are those of `Snapshot.answer`."""
+        if self.refusal:
+            return refusal("bad_request", self.refusal)
         return snapshot.answer(self.start, self.goal, self.tolerance).complete()
-
-
-@dataclass(frozen=True, eq=False)
-class UnreadableRequest:
-    """A request that cannot be read; its answer is the reason."""
-
-    reason: str
-    """Why it cannot be read."""
-    hash: str = ""
-    """Hash of the request; empty if it has none."""
-
-    def judge(self, _snapshot: Snapshot) -> PathJudgement:
-        """Return the refusal."""
-        return refusal("bad_request", self.reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +91,7 @@ class ReachQuery:
         )
 
 
-Question = PathQuestion | GivenPath | ReachQuery | UnreadableRequest
+Question = PathQuestion | GivenPath | ReachQuery
 """What a service asks. It judges itself by a snapshot; a RoverError refuses it."""
 
 

@@ -15,7 +15,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.parameters.traverse_server import FAN, LATTICE
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, SuspensionReport, refusal
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.learned_ground import LearnedGround
@@ -29,7 +29,6 @@ from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSE
 from rover_planner.planning.search.query import SearchQuery
 from rover_planner.planning.search.site import Site
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
-from rover_planner.planning.verdict_report import SuspensionReport
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 
@@ -172,7 +171,7 @@ class Snapshot:
             return missing
         assert self.path.poses is not None
         site = self._site()
-        poses = densify(self.path.poses, site.options.waypoint_spacing)
+        poses, _ = densify(self.path.poses, site.options.waypoint_spacing)
         path = PathJudge(site).check(poses, stop_at_failure=stop_at_failure)
         return self._describe(site, path)
 

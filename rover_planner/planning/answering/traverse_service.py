@@ -140,17 +140,11 @@ class TraverseService:
         if known is not None:
             self._keep_map(replace(known, received=terrain, cells=cells))
 
-    def renew_map(self, stamp: int | None) -> None:
-        """Note that the present map has arrived once more, with a stamp [ns] or None."""
-        known = self.known_map
-        if known is not None:
-            self.known_map = replace(known, stamp=stamp, arrival=self._clock())
-
     def refresh_map(self) -> None:
         """Interpolate the gaps of the received map again, with the present settings."""
         known = self.known_map
         if known is not None:
-            self._keep_map(known)
+            self.known_map = self._fill_gaps(known)
 
     def prepare(self) -> None:
         """Pack the present map for questions; the watch, which looks at a part, does not wait."""
@@ -234,12 +228,20 @@ class TraverseService:
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.
 
-        `prepare` makes the first question about it fast.
+        One that says the same as the last keeps its terrain, on which nothing is judged again.
+        `prepare` makes the first question about a new one fast.
         """
-        received, gap = about.received, self.settings.largest_gap
-        terrain = received.fill_gaps(gap) if gap > 0.0 else received
+        before, content = self.known_map, fingerprint(about.received)
+        if before is not None and before.fingerprint == content:
+            same = before.received, before.terrain
+            self.known_map = replace(about, received=same[0], terrain=same[1], fingerprint=content)
+            return False
+        self.known_map = self._fill_gaps(replace(about, fingerprint=content))
+        return True
+
+    def _fill_gaps(self, known: KnownMap) -> KnownMap:
+        """Return a map with the gaps of what was received interpolated, if so set."""
         forget_terrains()
-        before = self.known_map
-        content = fingerprint(received)
-        self.known_map = replace(about, terrain=terrain, fingerprint=content)
-        return before is None or before.fingerprint != content
+        gap = self.settings.largest_gap
+        terrain = known.received.fill_gaps(gap) if gap > 0.0 else known.received
+        return replace(known, terrain=terrain)

@@ -19,7 +19,7 @@ from rover_physics.traversability.pose_classes import (
     classify_poses,
 )
 from rover_planner.maps.cells import grid_of
-from rover_planner.maps.changes import Shift, find_changes, find_overlap, have_same_layers
+from rover_planner.maps.layers import Shift, find_changes, find_overlap, have_same_layers
 
 TILE = 32
 """Cells along the side of a tile; tiles are judged one after another."""

@@ -6,25 +6,20 @@ import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
-from rover_planner.maps.known_map import KnownMap
-from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, SuspensionReport, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.marked_places import MarkedPlaces
 from rover_planner.planning.navigation.watched_path import Place, WatchedPath
-from rover_planner.planning.verdict_report import SuspensionReport
 
 IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
 """States of a monitor."""
@@ -53,16 +48,6 @@ class Sight:
     """(3,) x, y [m] and yaw [rad] of the body, measured just now; None if it is not known."""
     time: float
     """Time of the steady clock [s]."""
-
-    @property
-    def limits(self) -> TraverseServerParameters:
-        """The parameters with the limits of the watch."""
-        return self.snapshot.settings.parameters
-
-    @property
-    def wheel_radius(self) -> float:
-        """Wheel radius of the rover [m]."""
-        return self.snapshot.settings.rover.wheel.radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +122,10 @@ class PathMonitor:
         A path that the rover does not stand on answers a question about another place: the path
         that is watched stays.
         """
+        settings = sight.snapshot.settings
         if sight.pose is not None:
-            offset = path.find_place(sight.pose, wheel_radius=sight.wheel_radius).offset
-            if offset > sight.snapshot.settings.monitor_offset:
+            place = path.find_place(sight.pose, wheel_radius=settings.rover.wheel.radius)
+            if place.offset > settings.monitor_offset:
                 return False
         self._path, self._judged_on, self._pose_time = path, None, sight.time
         self._joints_time = None
@@ -169,9 +155,8 @@ class PathMonitor:
             self._find_place(self._path, sight)
             or self._miss_joints(sight)
             or self._refuse_drift(sight)
+            or self._judge_rest(self._path, sight)
         )
-        if refused is None:
-            refused = self._judge_rest(self._path, sight)
         if refused is not None:
             return self.stop(refused)
         place = self.finding.place
@@ -181,17 +166,18 @@ class PathMonitor:
 
     def _find_place(self, path: WatchedPath, sight: Sight) -> PathJudgement | None:
         """Find the place of the rover; return a refusal if it is unknown or off the path."""
+        settings = sight.snapshot.settings
         if sight.pose is None:
             missing = sight.time - self._pose_time
-            if missing <= sight.limits.monitor_timeout:
+            if missing <= settings.parameters.monitor_timeout:
                 return None
             return refusal(NO_POSE, f"the rover's pose is not known for {missing:.1f} s")
         self._pose_time = sight.time
         last = self.finding.place
         seen = None if last is None else last.index
-        place = path.find_place(sight.pose, seen, sight.wheel_radius)
+        place = path.find_place(sight.pose, seen, settings.rover.wheel.radius)
         self.finding = replace(self.finding, place=place)
-        most = sight.snapshot.settings.monitor_offset
+        most = settings.monitor_offset
         if place.offset <= most:
             return None
         reason = f"the rover is {place.offset:.2f} m beside its path, limit {most:.2f} m"
@@ -199,12 +185,13 @@ class PathMonitor:
 
     def _miss_joints(self, sight: Sight) -> PathJudgement | None:
         """Return a refusal if the suspension is compared, and is no longer measured."""
-        if not sight.limits.monitor_mismatch:
+        limits = sight.snapshot.settings.parameters
+        if not limits.monitor_mismatch:
             return None
         if sight.snapshot.measured_pose is not None:
             self._joints_time = sight.time
         missing = 0.0 if self._joints_time is None else sight.time - self._joints_time
-        if missing <= sight.limits.monitor_timeout:
+        if missing <= limits.monitor_timeout:
             return None
         reason = f"suspension angles and odometry are not known together for {missing:.1f} s"
         return refusal(NO_JOINTS, reason)
@@ -216,7 +203,7 @@ class PathMonitor:
 
     def _refuse_drift(self, sight: Sight) -> PathJudgement | None:
         """Return a refusal if the suspension has differed too much for some time."""
-        lasting, most = self._drift.lasting(), sight.limits.monitor_mismatch
+        most, lasting = sight.snapshot.settings.parameters.monitor_mismatch, self._drift.lasting()
         if not 0.0 < most < lasting:
             return None
         latest = self._drift.latest
@@ -270,22 +257,6 @@ class PathMonitor:
         return _check(snapshot, path.poses[first:])
 
 
-def rehearse(settings: ServiceSettings) -> None:
-    """Look once, at level ground that is not known exactly, so that no later look takes longer."""
-    flat = np.zeros((120, 120))
-    ground = Terrain(flat, 0.05, (-3.0, -3.0), elevation_std=flat + 0.001)
-    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros((41, 2))])
-    snapshot = Snapshot(
-        settings,
-        joints=dict.fromkeys(SUSPENSION_JOINTS, 0.0),
-        known_map=KnownMap(ground, ground, "", None, 0.0, ""),
-        measured_pose=poses[0],
-    )
-    monitor, sight = PathMonitor(), Sight(snapshot, poses[0], 0.0)
-    monitor.take_path(WatchedPath(poses), sight)
-    monitor.look(sight)
-
-
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
     return replace(snapshot, path=GivenPath(poses, "")).check_path(stop_at_failure=True)
 
@@ -316,34 +287,33 @@ def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:
         enabled: Whether accepted paths are watched.
         tolerance: Difference of measured and predicted suspension angles [rad] that is no warning.
     """
-    values = {"monitor": enabled, **_values_of(finding)}
-    drifts = finding.drift > tolerance
-    drift = (
-        f"measured and predicted suspension differ by {finding.drift:.3f} rad, "
-        f"tolerance {tolerance:.3f} rad"
-    )
-    if enabled and finding.state == IDLE:
-        return Health(WARN, "stop: no path is watched; the rover may drive accepted paths", values)
-    if enabled and finding.state == STOPPED and finding.judgement is not None:
-        return Health(
-            ERROR, f"stop ({finding.judgement.code}): {finding.judgement.reason}", values
-        )
-    if drifts:
-        return Health(WARN, drift, values)
-    if not enabled:
-        return Health(OK, "no path is watched: the parameter monitor is false", values)
-    return Health(OK, finding.state, values)
-
-
-def _values_of(finding: Finding) -> dict[str, Any]:
-    place = finding.place
-    values: dict[str, Any] = {"state": finding.state, "path_hash": finding.path_hash}
-    values["judgements"] = finding.judged
+    place, judgement, drift = finding.place, finding.judgement, finding.drift
+    values = {
+        "monitor": enabled,
+        "state": finding.state,
+        "path_hash": finding.path_hash,
+        "judgements": finding.judged,
+    }
     if place is not None:
         values["remaining"] = f"{place.remaining:.3f} m"
         values["offset"] = f"{place.offset:.3f} m"
     if finding.mismatch:
-        values["suspension_drift"] = f"{finding.drift:.4f} rad"
+        values["suspension_drift"] = f"{drift:.4f} rad"
     for joint, difference in finding.mismatch.items():
         values[f"mismatch {joint}"] = f"{difference:+.4f} rad"
-    return values
+    level, text = OK, finding.state
+    if enabled and finding.state == IDLE:
+        level, text = WARN, "stop: no path is watched; the rover may drive accepted paths"
+    elif enabled and finding.state == STOPPED and judgement is not None:
+        level, text = ERROR, f"stop ({judgement.code}): {judgement.reason}"
+    elif drift > tolerance:
+        level, text = (
+            WARN,
+            (
+                f"measured and predicted suspension differ by {drift:.3f} rad, "
+                f"tolerance {tolerance:.3f} rad"
+            ),
+        )
+    elif not enabled:
+        text = "no path is watched: the parameter monitor is false"
+    return Health(level, text, values)

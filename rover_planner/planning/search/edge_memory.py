@@ -12,7 +12,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.ground import BLOCK
-from rover_planner.maps.changes import find_changes, have_same_layers
+from rover_planner.maps.layers import find_changes, have_same_layers
 from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes

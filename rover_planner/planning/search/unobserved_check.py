@@ -40,11 +40,7 @@ class UnobservedCheck:
         )
 
     def refuses(self, rover: Rover, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
-        """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).
-
-        Each pose counts. `find` looks at a path where the belly has moved on by a cell, so a path
-        of pieces that are not refused passes there.
-        """
+        """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3)."""
         if self.seen is None or not pieces:
             return np.zeros(len(pieces), bool)
         below = self.seen.refused_below(rover, np.concatenate(pieces), self.rule)

@@ -1,46 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Advice on the path that is looked at: sought, told beside the reason of a refusal, and taken."""
+"""Advice on the path that is looked at: told beside the reason of a refusal, and taken."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from rover_planner.advice.advise import STOPPED, Advice, grow_advice
-from rover_planner.advice.case import case_of
+from rover_planner.advice.advise import STOPPED, Advice
 from rover_planner.advice.remedy import Remedy
-from rover_planner.viewer.state.scenario import JudgedPath, Scenario
+from rover_planner.viewer.state.scenario import Scenario
 
 PROMISED = 20.0
 """Time after which the page tells what was found so far, and that the search goes on [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Advised:
-    """A path and the advice on it."""
-
-    path: JudgedPath
-    """The path."""
-    since: float
-    """When a visitor asked for advice, on the monotonic clock [s]."""
-    advice: Advice | None = None
-    """Advice that was found so far; None before the first result."""
-
-    @property
-    def remedies(self) -> list[Remedy]:
-        """The remedies in the order of the list."""
-        found = self.advice
-        return [] if found is None else [*found.remedies, *found.others]
-
-
-def seek_advice(advised: Advised) -> Iterator[Advised]:
-    """Yield the advice on a path as it grows.
-
-    Raises:
-        RoverError: The model refuses the path or an option.
-    """
-    case = case_of(advised.path.scenario.site, advised.path.poses)
-    for found in grow_advice(case):
-        yield replace(advised, advice=found)
+def list_remedies(advice: Advice | None) -> Sequence[Remedy]:
+    """Return the remedies in the order of the list."""
+    return () if advice is None else (*advice.remedies, *advice.others)
 
 
 def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
@@ -60,17 +35,19 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
     )
 
 
-def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> dict[str, Any]:
+def describe_advice(
+    advice: Advice | None, sought_at: float | None, is_seeking: bool, now: float
+) -> dict[str, Any]:
     """Return what is tried, and the remedies found so far, by their words: more are found.
 
     A change of the ground is no value of the page: such remedies are told, and not taken.
 
     Args:
-        advised: The advice on the path that is looked at; None if none was sought.
+        advice: Advice on the path that is looked at, as found so far; None before the first.
+        sought_at: When a visitor asked for it, on the monotonic clock [s]; None if nobody has.
         is_seeking: True if levers are still tried.
         now: The monotonic clock [s].
     """
-    advice = None if advised is None else advised.advice
     is_complete = advice is not None and advice.complete
     rows = [
         {
@@ -78,24 +55,23 @@ def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> di
             "words": remedy.describe(),
             "costs": remedy.describe_costs(),
         }
-        for remedy in ([] if advised is None else advised.remedies)
+        for remedy in list_remedies(advice)
     ]
-    words = _write_progress(advised, is_seeking, now)
+    words = ""
+    if sought_at is not None:
+        words = _write_progress(advice, is_seeking, now - sought_at >= PROMISED)
     can_ask = not is_seeking and not is_complete
     return {"can_ask": can_ask, "seeking": is_seeking, "words": words, "rows": rows}
 
 
-def _write_progress(advised: Advised | None, is_seeking: bool, now: float) -> str:
+def _write_progress(advice: Advice | None, is_seeking: bool, is_late: bool) -> str:
     """Return how far the search is: what is tried, or what was found at its end."""
-    if advised is None:
-        return ""
-    advice = advised.advice
+    found = list_remedies(advice)
     if not is_seeking and advice is not None and advice.complete:
         return "" if advice.found else advice.describe()
     if not is_seeking:
-        return "the search was stopped" if advised.remedies else STOPPED
+        return "the search was stopped" if found else STOPPED
     names = () if advice is None else advice.tried
     tried = f"tried: {' and '.join(names).replace('_', ' ') or 'nothing yet'}"
-    found = len(advised.remedies) or "nothing"
-    is_late = now - advised.since >= PROMISED
-    return f"{found} found so far; the search goes on, {tried}" if is_late else tried
+    many = len(found) or "nothing"
+    return f"{many} found so far; the search goes on, {tried}" if is_late else tried

@@ -4,7 +4,6 @@
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -93,10 +92,11 @@ def _list_policies(shown: Shown) -> list[dict[str, Any]]:
     """Return the verdicts under all policies; none for a replay, whose soil is not known."""
     rows = []
     for policy, title in POLICY_TITLES.items() if shown.scenario.recorded is None else ():
-        one = shown.by_policy.get(policy, "")
+        values, one = shown.by_policy.get(policy, (None, ""))
+        if policy == shown.verdict.policy:
+            values, one = shown.scenario, shown.verdict
         passes, reason = (None, one) if isinstance(one, str) else (one.traversable, one.reason)
-        is_fresh = policy == shown.verdict.policy or shown.policies_for is shown.scenario
-        old = not (one and is_fresh)
+        old = values is not shown.scenario
         word = {None: "not judged", True: "passes", False: "refused"}[passes]
         row = {"title": title, "word": word, "passes": passes, "old": old}
         rows.append({**row, "reason": reason or word})
@@ -279,11 +279,7 @@ def describe_board(state: RoverState | None, failing: str = "") -> dict[str, Any
 # The rover's numbers, and what differs from the reference.
 
 
-Sliders = dict[str, list[RoverValue]]
-"""Changeable numbers of a rover by part."""
-
-
-def list_sliders(rover: Rover) -> Sliders:
+def list_sliders(rover: Rover) -> dict[str, list[RoverValue]]:
     """Return the changeable numbers of a rover by part; the last are the angles of its arm."""
     parts, arm = list_values(rover), rover.manipulator
     if arm is not None:
@@ -295,20 +291,7 @@ def list_sliders(rover: Rover) -> Sliders:
     return parts
 
 
-def widen_sliders(sliders: Sliders, scenario: Scenario) -> Sliders:
-    """Return sliders whose ends include the numbers of a scenario; the same ones if they do."""
-    now = read_values(scenario)
-    wider = {
-        title: [
-            replace(k, low=min(k.low, now[k.label]), high=max(k.high, now[k.label]))
-            for k in values
-        ]
-        for title, values in sliders.items()
-    }
-    return sliders if wider == sliders else wider
-
-
-def describe_sliders(sliders: Sliders, scenario: Scenario) -> list[dict[str, Any]]:
+def describe_sliders(scenario: Scenario) -> list[dict[str, Any]]:
     """Return sliders by part: label, ends, step and the value of the rover as loaded."""
     loaded = read_values(scenario.as_loaded())
     return [
@@ -316,7 +299,7 @@ def describe_sliders(sliders: Sliders, scenario: Scenario) -> list[dict[str, Any
             "title": title,
             "sliders": [[k.label, k.low, k.high, k.step, loaded[k.label]] for k in values],
         }
-        for title, values in sliders.items()
+        for title, values in list_sliders(scenario.loaded).items()
     ]
 
 

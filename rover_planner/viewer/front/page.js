@@ -183,7 +183,7 @@ function drawSliders(parts) {
   fill("sliders", parts.map((part, k) => make("details", { open: k < 2 },
     make("summary", {}, make("b", {}, part.title)),
     part.sliders.map(([label, low, high, step, loaded]) => {
-      const send = ({ target }) => target.value && ask({ ask: "value", label, value: Number(target.value) });
+      const send = ({ target: { value, min, max } }) => value && ask({ ask: "value", label, value: Math.min(Math.max(value, min), max) });
       const move = () => { chosen.moved = label; };
       const settle = () => setTimeout(() => {
         if (chosen.moved === label) chosen.moved = null;
@@ -203,7 +203,10 @@ function drawValues(values) {
     const now = values[row.dataset.label] ?? 0;
     row.toggleAttribute("data-changed", Math.abs(now - row.dataset.loaded) > 1e-9);
     if (chosen.moved === row.dataset.label) continue;
-    for (const input of row.querySelectorAll("input")) input.value = String(Number(now.toPrecision(6)));
+    for (const input of row.querySelectorAll("input")) {
+      [input.min, input.max] = [Math.min(input.min, now), Math.max(input.max, now)];
+      input.value = String(Number(now.toPrecision(6)));
+    }
   }
 }
 

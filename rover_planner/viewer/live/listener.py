@@ -44,10 +44,10 @@ from rover_planner.viewer.live.live_state import (
     CLICK,
     ODOMETRY,
     SIGN_OF_LIFE,
-    LearnedTrail,
     LiveData,
     LiveQuestion,
     TopicAge,
+    add_to_trail,
 )
 
 SERVER, CONTROLLER = "/traverse_server", "/traction_controller"
@@ -217,9 +217,10 @@ class LiveListener(Node):
 
     def _on_ground(self, message: String) -> None:
         ground, known = parse_learned(message.data, "ground_estimate"), self._data
-        at = None if known.position is None else known.position[:2]
-        trail = known.learned or LearnedTrail(ground)
-        self._data = replace(known, learned=trail.add(ground, at))
+        trail = known.trail
+        if known.position is not None:
+            trail = add_to_trail(trail, known.position[:2], ground)
+        self._data = replace(known, learned=ground, trail=trail)
 
     def _on_plan(self, plan: Path) -> None:
         poses = path_to_poses(plan, self._frame) if plan.poses else None

@@ -73,26 +73,6 @@ class LiveQuestion:
 
 
 @dataclass(frozen=True, eq=False)
-class LearnedTrail:
-    """Ground that a rover has learned, and where."""
-
-    ground: LearnedGround
-    """Last estimate."""
-    places: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    """(n, 3) x, y [m] and the friction that was known there: measured, or the least there is."""
-
-    def add(self, ground: LearnedGround, at: Floats | None) -> "LearnedTrail":
-        """Return the trail with what was learned at a place (2,) [m], None if it is not known."""
-        if at is None:
-            return LearnedTrail(ground, self.places)
-        friction = ground.mean if ground.is_bounded else ground.low
-        places = self.places[-MAX_TRAIL:]
-        if len(places) > 1 and np.hypot(*(places[-2, :2] - at)) < TRAIL_STEP:
-            places = places[:-1]
-        return LearnedTrail(ground, np.vstack([places, [*at, friction]]))
-
-
-@dataclass(frozen=True, eq=False)
 class LiveData:
     """The latest data of a rover and its server; None for what has not come."""
 
@@ -124,8 +104,11 @@ class LiveData:
     """Last answer of the server, whoever asked."""
     click: LiveQuestion | None = None
     """The last question of a visitor; None without one."""
-    learned: LearnedTrail | None = None
-    """Estimates of the ground along the drive."""
+    learned: LearnedGround | None = None
+    """Last estimate of the ground."""
+    trail: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    """(n, 3) x, y [m] of the drive and the friction that was known there: measured, or the least
+    there is."""
     ages: Mapping[str, TopicAge] = field(default_factory=dict)
     """The ages of all topics by name."""
 
@@ -215,11 +198,19 @@ def write_age(seconds: float) -> str:
     return "just now" if seconds < PATIENCE else f"{seconds:.0f} s ago"
 
 
-def describe_learned(learned: LearnedTrail | None) -> list[str]:
+def add_to_trail(trail: Floats, at: Floats, ground: LearnedGround) -> Floats:
+    """Return a trail (n, 3), as `LiveData` has it, with what was learned at a place (2,) [m]."""
+    friction = ground.mean if ground.is_bounded else ground.low
+    kept = trail[-MAX_TRAIL:]
+    if len(kept) > 1 and np.hypot(*(kept[-2, :2] - at)) < TRAIL_STEP:
+        kept = kept[:-1]
+    return np.vstack([kept, [*at, friction]])
+
+
+def describe_learned(ground: LearnedGround | None) -> list[str]:
     """Return what was learned of the ground in words; none before the first estimate."""
-    if learned is None:
+    if ground is None:
         return []
-    ground = learned.ground
     words = f"friction {ground.mean:.2f}, give or take {ground.std:.2f}: wheels have slipped"
     if not ground.is_bounded:
         words = f"friction at least {ground.low:.2f}: no wheel has slipped yet"

@@ -21,9 +21,8 @@ from rover_planner.viewer.front.channel import Channel, Mailbox, Part
 from rover_planner.viewer.scene.ground_mesh import intersect_ground
 from rover_planner.viewer.scene.scene import START, VIEWS, Scene
 from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Result, Steps, Take
-from rover_planner.viewer.state.layers import PREDICTED, Colouring, list_layers
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, ShownSurvey, list_layers
 from rover_planner.viewer.state.session import REFUSALS
-from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 PERIOD = 0.04
 """Time between two pictures [s]."""

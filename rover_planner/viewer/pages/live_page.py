@@ -10,6 +10,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.planning.search.site import Site
 from rover_planner.viewer.documents.paths import describe_board
 from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.live.live_state import (
@@ -22,7 +23,6 @@ from rover_planner.viewer.pages.base import HERE, Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
 from rover_planner.viewer.scene.ground_mesh import paint
 from rover_planner.viewer.scene.scene import START
-from rover_planner.viewer.state.layers import LayerRequest
 
 BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""
@@ -69,7 +69,7 @@ class LivePage(PageBase):
     def paint(self) -> None:
         """Begin to colour the ground, if it is known."""
         if self.ground_name:
-            self.painter.ask(paint(LayerRequest(self._rover, self.ground, self.colouring)))
+            self.painter.ask(paint(Site(self._rover, self.ground), self.colouring))
 
     def click(self, point: Floats, shift: bool) -> None:
         """Ask the server for a plan to a point."""
@@ -93,8 +93,8 @@ class LivePage(PageBase):
         tell("subject", facts)
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
-        trail = None if data.learned is None else data.learned.places
         draw, old, paths = self.draw_made, bool(answer["old"]), self.scene.paths
+        trail = data.trail
         draw("the trail is not drawn", lambda *_: paths.show_trail(trail), trail, self.ground)
         draw(
             "the plan is not drawn", lambda *_: paths.show_plan(plan, old), plan, old, self.ground

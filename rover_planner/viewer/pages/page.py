@@ -12,6 +12,8 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
 from rover_physics.terrain.grid import fingerprint
 from rover_physics.terrain.soil_file import load_soils
+from rover_planner.advice.advise import Advice, grow_advice
+from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
@@ -23,10 +25,9 @@ from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import Step
-from rover_planner.viewer.state.layers import PREDICTED, Colouring, LayerRequest
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, ShownSurvey
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
-from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 NOTICE_DELAY = 0.2
 """Time without a result after which the page tells what it judges, and greys what is old [s]."""
@@ -53,14 +54,15 @@ class Page(PageBase):
         self._opening: tuple[sharing.PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
-        self._sliders: paths.Sliders = {}
         asked = session.wanted
         super().__init__(asked.rover, asked.terrain, address, ground_name, survey)
         self._advice = self.begin_work(self._take_advice, "advice")
         self._judging = self.begin_work(self._take_judged, "judge")
         session.judge = self._judging.ask
-        self._advised: advice.Advised | None = None
-        """The path that is looked at and the advice on it; None if none was sought."""
+        self._sought_at: float | None = None
+        """When advice on the path that is looked at was asked for, on the monotonic clock [s]."""
+        self._advised: Advice | None = None
+        """What was found."""
         self._offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
@@ -75,9 +77,9 @@ class Page(PageBase):
 
     def paint(self) -> None:
         """Begin to colour the ground with what is shown on it."""
-        path, now = self.session.shown.path.poses, self.session.shown.scenario
-        asked = LayerRequest(now.rover, now.terrain, self.colouring, now.options.model, path)
-        self.painter.ask(paint(asked, self.survey))
+        shown = self.session.shown
+        site, path = shown.scenario.site, shown.path.poses
+        self.painter.ask(paint(site, self.colouring, path, self.survey))
 
     # What visitors ask.
 
@@ -130,27 +132,18 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        parts = self._find_sliders().values()
+        session = self.session
+        parts = paths.list_sliders(session.wanted.loaded).values()
         found = [one for values in parts for one in values if one.label == label]
         if not found:
             raise PlanningError(f"the rover has no number {label!r}")
-        (one,), session = found, self.session
-        number = min(max(number, one.low), one.high)
+        (one,) = found
         kind, name, *_ = (*one.keys[0], "")
         if kind == paths.JOINTS:
             angles = {**session.wanted.arm, str(name): number}
             session.take_change(session.wanted.change_options(joint_angles=angles))
         else:
             session.change_rover(one.keys, number)
-
-    def _find_sliders(self) -> paths.Sliders:
-        """Return the sliders of the rover; their ends include all that was wanted of it."""
-        wanted = self.session.wanted
-        if self.has_changed("loaded", wanted.loaded):
-            self._sliders = paths.list_sliders(wanted.loaded)
-        if self.has_changed("wanted", wanted):
-            self._sliders = paths.widen_sliders(self._sliders, wanted)
-        return self._sliders
 
     def _cancel(self) -> None:
         self.session.is_stopped |= self._judging.cancel()
@@ -166,18 +159,19 @@ class Page(PageBase):
     # Advice.
 
     def _seek_advice(self) -> None:
-        self._advised = advice.Advised(self.session.shown.path, time.monotonic())
-        self._advice.ask(advice.seek_advice(self._advised))
+        path = self.session.shown.path
+        self._sought_at, self._advised = time.monotonic(), None
+        self._advice.ask(grow_advice(case_of(path.scenario.site, path.poses)))
 
-    def _take_advice(self, _steps: Any, found: advice.Advised | BaseException) -> None:
+    def _take_advice(self, _steps: Any, found: Advice | BaseException) -> None:
         if isinstance(found, BaseException):
-            self._advised = None
+            self._sought_at = None
             raise PlanningError(f"no advice: {found}")
-        if found.path is self.session.shown.path:
+        if self._sought_at is not None:  # and nobody looks at another path meanwhile
             self._advised = found
 
     def _find_remedy(self, words: str | None) -> Remedy | None:
-        remedies = [] if self._advised is None else self._advised.remedies
+        remedies = advice.list_remedies(self._advised)
         return next((one for one in remedies if one.describe() == words), None)
 
     def _show_ghost(self, words: str | None) -> None:
@@ -288,7 +282,7 @@ class Page(PageBase):
         asked, path = shown.scenario, shown.path
         if self.has_changed("advice", path):
             self._advice.cancel()  # nobody looks at its path any more
-            self._advised = None
+            self._advised = self._sought_at = None
             self._show_ghost(None)
         self.run(TELLING, self.tell)
         if self.has_changed("ends", asked.start, asked.goal):
@@ -342,10 +336,11 @@ class Page(PageBase):
             one.progress is not None for one in (self._judging, self._advice)
         )
         made("paths", paths.describe_paths, shown, bool(work["old"]), is_judging)
-        helps = advice.describe_advice(self._advised, is_seeking, time.monotonic())
+        now = time.monotonic()
+        helps = advice.describe_advice(self._advised, self._sought_at, is_seeking, now)
         tell("advice", None if shown.verdict.traversable else helps)
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
-        made("sliders", lambda now: paths.describe_sliders(now, wanted), self._find_sliders())
+        made("sliders", lambda _: paths.describe_sliders(wanted), wanted.loaded)
         made("values", paths.read_values, wanted)
         made("changes", paths.describe_changes, path, reference, session.kept is not None)
         made("limits", paths.describe_limits, path, reference, shown.chance)

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
+from rover_planner.planning.search.site import Site
 from rover_planner.viewer.scene.canvas import find_origin
 from rover_planner.viewer.state import layers
 from rover_planner.viewer.state.background_work import WorkStep
-from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 SHADES = (0.3, 1.25)
 """Least and largest brightness of the ground; 1 where it is level."""
@@ -31,22 +31,26 @@ the screen takes most of the time of a picture."""
 
 
 def paint(
-    asked: layers.LayerRequest, survey: ShownSurvey | None = None
+    site: Site,
+    how: layers.Colouring,
+    path: Floats | None = None,
+    survey: layers.ShownSurvey | None = None,
 ) -> Iterator[WorkStep | tuple[bytes, Mapping[str, Any]]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
-    A layer that is predicted for the rover takes seconds.
+    A layer that is predicted for the rover takes seconds; it may be for the heading of a path of
+    poses (n, 3).
     """
     yield WorkStep("ground")
-    name, ground = asked.how.layer, layers.thin(asked.terrain)
+    name, ground = how.layer, layers.thin(site.terrain)
     if survey is not None and name in survey.names:
         places = layers.spread(ground, layers.count_pixels(ground))
-        coloured = survey.colour(name, asked.rover, asked.options, places)
+        coloured = survey.colour(name, site.rover, site.options.model, places)
     elif name in layers.PREDICTED:
-        coloured = layers.colour_limit(asked, ground)
+        coloured = layers.colour_limit(site, how, ground, path)
     else:
         coloured = layers.colour_ground(name, ground)
-    yield write_ground(ground, coloured, find_origin(asked.terrain)), coloured.legend
+    yield write_ground(ground, coloured, find_origin(site.terrain)), coloured.legend
 
 
 def draw_picture(ground: Terrain, coloured: layers.ColouredGround) -> NDArray[np.uint8]:

@@ -77,12 +77,11 @@ class PathOverlay:
         strands = [] if path is None else [self._find_strand(path[:, :2], colour)]
         self._canvas.show_lines(f"{LINES}/{name}", strands, WIDE)
 
-    def show_trail(self, trail: Floats | None) -> None:
+    def show_trail(self, trail: Floats) -> None:
         """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""
-        known = np.empty((0, 3)) if trail is None else trail
-        colours = map_colours(known[1:, 2], 0.0, 1.0).tolist()
+        colours = map_colours(trail[1:, 2], 0.0, 1.0).tolist()
         strands = [
-            self._find_strand(known[k : k + 2, :2], (red, green, blue))
+            self._find_strand(trail[k : k + 2, :2], (red, green, blue))
             for k, (red, green, blue) in enumerate(colours)
         ]
         self._canvas.show_lines(f"{LINES}/trail", strands, WIDE)

@@ -107,10 +107,7 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
     for k, poses in enumerate(paths):
         yield WorkStep(PATH, k + 1, len(paths))
         judged.append(_judge(asked, poses))
-    chosen = choose(tuple(judged)).choice
-    verdict = judged[chosen].verdict
-    policies = {verdict.policy: verdict}
-    return Shown(asked, tuple(judged), chosen, len(judged), by_policy=policies)
+    return Shown(asked, tuple(judged), choose(tuple(judged)).choice, len(judged))
 
 
 def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, None, Shown]:
@@ -124,13 +121,10 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
         yield WorkStep(PATH)
         path = _judge(asked, path.poses)
     paths = (*paths[:index], path, *paths[index + 1 :])
-    old, judged_for = before.by_policy, before.policies_for
-    if path.poses is not before.path.poses:
-        old, judged_for = {}, None
-    policies = {**old, path.verdict.policy: path.verdict}
+    policies = before.by_policy if path.poses is before.path.poses else {}
     around = before.around if same else None
     chance = before.chance if path is before.path else None
-    return Shown(asked, paths, index, generated, None, policies, judged_for, chance, around)
+    return Shown(asked, paths, index, generated, None, policies, chance, around)
 
 
 def _recall(shown: Shown, before: Shown | None, values: Scenario) -> JudgedPath | None:
@@ -144,17 +138,18 @@ def _recall(shown: Shown, before: Shown | None, values: Scenario) -> JudgedPath 
 
 def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
     """Return what is shown with the path's verdicts under all policies."""
-    asked, found = shown.scenario, dict(shown.by_policy)
+    asked, own = shown.scenario, shown.verdict
+    found = {**shown.by_policy, own.policy: (asked, own)}
     for k, policy in enumerate(TORQUE_POLICIES):
-        if policy == asked.options.model.policy or shown.policies_for is asked:
+        if policy in found and found[policy][0] is asked:
             continue
         yield WorkStep(POLICY, k + 1, len(TORQUE_POLICIES))
         try:
             values = asked.change_options(policy=policy)
-            found[policy] = _judge(values, shown.path.poses).verdict
+            found[policy] = asked, _judge(values, shown.path.poses).verdict
         except RoverError as error:
-            found[policy] = str(error)
-    return replace(shown, by_policy=found, policies_for=asked)
+            found[policy] = asked, str(error)
+    return replace(shown, by_policy=found)
 
 
 def _add_chance(shown: Shown) -> Shown:

@@ -165,10 +165,9 @@ class Shown:
     """Number of candidates; paths beyond were searched."""
     reference: JudgedPath | None = None
     """The same path with the values of the reference; None if nothing differs from it."""
-    by_policy: Mapping[str, Verdict | str] = field(default_factory=dict)
-    """Its verdicts under torque policies that are known, or why a policy has none."""
-    policies_for: Scenario | None = None
-    """Values for which those under other policies than its own were judged."""
+    by_policy: Mapping[str, tuple[Scenario, Verdict | str]] = field(default_factory=dict)
+    """Its known verdicts under torque policies, or why a policy has none, each with the values of
+    the page for which it was judged."""
     chance: FailureChance | None = None
     """The chance that the path fails, up to where a limit is broken; None while it is not known,
     or for a replay."""

@@ -37,8 +37,7 @@ def test_who_comes_after_the_answer_hears_all_results(start_server, ros):
     server.service.take_terrain(make_terrain(waves))
     _, future = begin_plan(ros)
     wait_until(future.done, "the answer")
-    work = server._results._deferred_work
-    wait_until(lambda: not work._answers, "the results, which nobody hears yet")
+    wait_until(lambda: not server.handover._waiting, "the results, which nobody hears yet")
     late = ros.spin(PlannerClient(ros)).heard
     wait_until(lambda: all(late.values()), "all results")
     assert late["plan"] == [future.result().plan]

@@ -208,6 +208,18 @@ def test_a_rover_that_does_not_settle_fails_for_sure():
     assert (verdict.failure_chance, verdict.failure_chance_at) == (1.0, (0.0, 1.0))
 
 
+def test_unknown_ground_beside_the_path_is_no_failure():
+    ground, rover = plane(0.3, 0.0), rover_with(friction=0.1, position=0.05)
+    y = ground.origin[1] + ground.resolution * np.arange(len(ground.elevation))
+    beyond = abs(y) > 0.36 + ground.resolution  # the wheels end at 0.35 m
+    seen = replace(ground, elevation=np.where(beyond[:, None], np.nan, ground.elevation))
+    told = chance_on(ground, rover).failure_chance
+    assert 0.1 < told < 0.9
+    assert chance_on(seen, rover).failure_chance == told
+    aside = judge_path(rover, seen, straight(5) + np.array([0.0, 0.05, 0.0]), SLIPPERY)[1]
+    assert aside.code == "unknown_ground"
+
+
 def test_the_docs_tell_what_is_uncertain_and_its_default():
     rows = re.findall(r"^- `(\w+)` \(([\d.]+)\)", DOCS.read_text(), re.MULTILINE)
     assert {name: float(value) for name, value in rows} == vars(Uncertainty())

@@ -26,7 +26,7 @@ def changed(key: str, *value: object) -> dict[str, Any]:
     data = place = copy.deepcopy(LSR1)
     *sections, last = key.split(".")
     for section in sections:
-        place = place[section]
+        place = place.setdefault(section, {})
     place.pop(last, None)
     if value:
         (place[last],) = value
@@ -115,6 +115,7 @@ def test_every_number_is_a_finite_number_of_its_sign(wrong):
         ("nominal_speed", 0.2, "at most wheel.max_speed x wheel.radius = 0.1"),
         *[("masses.body.com", value, "between the wheels")
           for value in ([1.0, 0.0, 0.05], [0.0, 0.9, 0.05])],
+        ("uncertainty.mass", 2.0, "at most 0.35 of masses.body.mass, 1.75 kg"),
         ("manipulator.joints", ["a", "b", "b"], "a list of 3 different names"),
         ("manipulator.joints", ["a", "b", "rocker_left"], "belongs to the suspension"),
         ("manipulator.link_lengths", [0.1, -0.3, 0.3], "negative"),

@@ -4,7 +4,8 @@
 import pytest
 
 pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
-from benchmarks.drives import BY_MAP, EQUAL_TORQUES, Obstacle, drive
+from benchmarks.drives import BY_MAP, EQUAL_TORQUES, drive
+from benchmarks.grounds import Obstacle
 from rover_physics import SweepOptions, judge_path, load_rover
 from rover_planner.simulator.mujoco_rover import TIMESTEP
 from support.reference_drives import drive_path, unlimited

@@ -111,7 +111,7 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     service = learned_on(1)
     laid = service.snapshot().known_map
     assert service.snapshot().known_map is laid  # packed once
-    service.renew_map(None)
+    service.take_terrain(replace(laid.received))  # the same map once more
     assert service.snapshot().terrain is laid.terrain
     identity = Register().identify("check_path", GivenPath(), service.snapshot())
     assert identity.ground_classes == {"1": 0.4}
@@ -181,11 +181,12 @@ def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
 
 def test_densify_keeps_the_given_poses_and_the_spacing():
     poses = np.array([[0.0, 0.0, 3.0], [0.1, 0.0, -3.0], [0.1, 0.0, 0.0], [0.1, 0.05, 0.0]])
-    dense = densify(poses, 0.02)
+    dense, next_given = densify(poses, 0.02)
     assert len(dense) == 5 + 1 + 3 + 1
     assert np.hypot(*np.diff(dense[:, :2], axis=0).T).max() <= 0.02 + 1e-12
     for pose in poses:
         assert np.isclose(dense, pose).all(axis=1).any()
+    assert next_given.tolist() == [0, 1, 1, 1, 1, 1, 2, 3, 3, 3]
     turned = np.abs(np.diff(np.unwrap(dense[:6, 2])))
     np.testing.assert_allclose(turned, (2 * math.pi - 6.0) / 5)
 

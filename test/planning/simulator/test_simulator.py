@@ -15,9 +15,8 @@ from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.simulator import range_sensor
 from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_rover import MujocoRover
-from rover_planner.simulator.path_follower import PathFollower
+from rover_planner.simulator.path_follower import PathFollower, SecondTry
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
-from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation
 from support.grounds import enlarged, make_terrain, plane, raised, rocky, waves
 from support.paths import arc_of, poses_at

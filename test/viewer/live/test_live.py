@@ -29,10 +29,10 @@ from rover_planner.viewer.live.live_state import (
     PATIENCE,
     SIGN_OF_LIFE,
     TRAIL_STEP,
-    LearnedTrail,
     LiveData,
     LiveQuestion,
     TopicAge,
+    add_to_trail,
     choose_answer,
     describe_learned,
     read_state,
@@ -161,8 +161,8 @@ def test_what_is_invalid_or_missing_is_unknown_and_plans_are_refused(ros, listen
 
 
 def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
-    def learned():
-        return listener.latest().learned
+    def told() -> list[str]:
+        return describe_learned(listener.latest().learned)
 
     def is_at(x: float) -> bool:
         return has_place(listener) and listener.latest().position[0] == x
@@ -174,19 +174,17 @@ def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(lis
     ):
         publish_until(talker.odometry, odometry(x, 0.0), lambda x=x: is_at(x), "the place")
         talker.estimates.publish(String(data=json.dumps({"friction": {**friction, "high": high}})))
-        wait_until(lambda words=words: words in describe_learned(learned()), words)
-    np.testing.assert_allclose(learned().places, [[0.0, 0.0, 0.35], [0.5, 0.0, 0.8]])
+        wait_until(lambda words=words: words in told(), words)
+    np.testing.assert_allclose(listener.latest().trail, [[0.0, 0.0, 0.35], [0.5, 0.0, 0.8]])
     assert describe_learned(None) == []
 
 
 def test_a_trail_keeps_places_a_step_apart_and_the_newest_of_many():
-    ground = LearnedGround(0.5, 0.1, 0.4, True)
-    trail = LearnedTrail(ground)
+    ground, trail = LearnedGround(0.5, 0.1, 0.4, True), np.empty((0, 3))
     for x in np.arange(0.0, 150.0, 0.04):
-        trail = trail.add(ground, np.array([x, 0.0]))
-    steps = np.diff(trail.places[:-1, 0])
-    assert len(trail.places) <= MAX_TRAIL + 1 and trail.places[-1, 0] == pytest.approx(149.96)
-    assert steps.min() > 0.5 * TRAIL_STEP and trail.add(ground, None).places is trail.places
+        trail = add_to_trail(trail, np.array([x, 0.0]), ground)
+    assert len(trail) <= MAX_TRAIL + 1 and trail[-1, 0] == pytest.approx(149.96)
+    assert np.diff(trail[:-1, 0]).min() > 0.5 * TRAIL_STEP
 
 
 def test_a_closed_link_leaves_no_thread_and_no_context():

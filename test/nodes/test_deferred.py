@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is put off runs after the callback; messages wait for listeners, responses for a pause."""
+"""Messages wait for listeners, and responses for those before them."""
 
 import time
-from functools import partial
 from types import SimpleNamespace
 
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int32
-from std_srvs.srv import Trigger
 
 from rover_planner.ros import deferred
-from rover_planner.ros.deferred import AT_ONCE, MAX_WAITING, PAUSE, DeferredWork, PacedSender
+from rover_planner.ros.deferred import AT_ONCE, PAUSE, PacedSender
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
-from support.ros_fixtures import call
 from support.waiting import repeat_until, wait_until
 
 
@@ -23,62 +20,6 @@ from support.waiting import repeat_until, wait_until
 def busy(ros):
     """Return a node that is not spun yet."""
     return Node("busy", context=ros.context)
-
-
-@pytest.fixture
-def serve(ros, client, busy):
-    """Return a function that spins the node with a service; it returns the service's client."""
-
-    def start(answer):
-        busy.create_service(Trigger, "ask", answer)
-        ros.spin(busy)
-        return client.create_client(Trigger, "ask")
-
-    return start
-
-
-def test_a_request_goes_before_what_is_left_of_the_work_which_no_error_ends(busy, serve):
-    deferred_work, told, pieces = DeferredWork(busy, Guard(busy.get_logger())), [], 2000
-
-    def work(k):
-        if "second" not in told:  # so that work is left however late the request comes
-            time.sleep(0.01)
-        told.append(k)
-
-    def answer(_request, response):
-        if "first" in told:
-            told.append("second")
-        else:
-            told.append("first")
-            deferred_work.do(lambda: 1 / 0, *(partial(work, k) for k in range(pieces)))
-        return response
-
-    ask = serve(answer)
-    call(ask, Trigger.Request())
-    wait_until(lambda: 0 in told, "the first of the work")
-    call(ask, Trigger.Request())
-    wait_until(lambda: len(told) == pieces + 2, "the work")
-    assert told.index("second") < told.index(pieces - 1)
-    assert [one for one in told if isinstance(one, int)] == list(range(pieces))
-
-
-def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(busy, serve, monkeypatch):
-    monkeypatch.setattr(deferred, "QUIET", 1e3)  # no pause is long enough
-    deferred_work, done, asked = DeferredWork(busy, Guard(busy.get_logger())), [], 3 * MAX_WAITING
-    numbers = iter(range(asked))
-
-    def answer(_request, response):
-        response.message = str(len(done))
-        number = next(numbers)
-        deferred_work.do(partial(done.append, (number, 0)), partial(done.append, (number, 1)))
-        return response
-
-    ask = serve(answer)
-    for k in range(asked):
-        finished = int(call(ask, Trigger.Request()).message) // 2
-        assert finished == max(0, k - MAX_WAITING)
-    expected = [(k, piece) for k in range(asked - MAX_WAITING) for piece in (0, 1)]
-    wait_until(lambda: done == expected, "the work of all but the last")
 
 
 def listen(ros, name="listener"):
