@@ -36,7 +36,7 @@ SIDE_SLIDE = 0.25
 """Distance aside over the distance that wheels roll while they slide, on any ground: a face that
 the rover meets askew pushes it aside."""
 JUMP = 2.0
-"""Distance of two poses over the one that the wheels rolled from which what measured them jumped."""
+"""Distance of two poses over the way that the wheels rolled from which a pose has jumped."""
 TRACTION_TIME = 0.5
 """Time over which the traction is averaged [s]: it jumps where wheels hop."""
 
