@@ -88,40 +88,14 @@ def find_crossings(
         rows.astype(float), jumps[:, 1].repeat(2), none_held(len(rows)), poses[rows], at_jumps
     )
     evaluated = join_crossings([path, turns])
+    ends = np.vstack([np.arange(len(rows)).reshape(-1, 2), len(rows) + jumps_in_turns])
     path_of = np.append(0, np.cumsum(~joined))
     at_failure = AtFailure.SEARCH_ON if model.on_servos else at_failure
     last = np.full(path_of[-1] + 1, len(path_of))
     searched = last, path_of, int(at_failure)
-    found = _look_within(model, path, searched)
-    found += _halve_in_turn(model, evaluated, len(rows) + jumps_in_turns, searched)
+    found = _halve_in_turn(model, evaluated, ends, searched)
     in_turns = evaluated.select(len(rows) + np.flatnonzero(inside))
     return join_crossings([in_turns, *found, at_rest]).in_order()
-
-
-def _look_within(model: PackedModel, pairs: Crossings, searched: Searched) -> list[Crossings]:
-    """Return the poses within stretches from waypoint to waypoint.
-
-    Those are evaluated that the model does not remember. It remembers none of a path that fails:
-    what is left out there depends on the other stretches.
-
-    Args:
-        model: The model.
-        pairs: (2k,) waypoints, by twos the ends of a stretch.
-        searched: As for `_halve_in_turn`.
-    """
-    ends = np.arange(len(pairs.place)).reshape(-1, 2)
-    if model.known is None:
-        return _halve_in_turn(model, pairs, ends, searched)
-    memory, waypoints = model.known.stretches, pairs.waypoint[::2]
-    asked = np.hstack([pairs.poses, pairs.results["motion"]]).reshape(-1, 12)
-    remembered = list(memory.recall(asked, waypoints))
-    new = np.array([one is None for one in remembered], bool)
-    found = _halve_in_turn(model, pairs, ends[new], searched)
-    last, path_of, at_failure = searched
-    if model.on_servos or at_failure != AtFailure.SEARCH_ON:
-        new &= last[path_of[waypoints]] == len(path_of)
-        memory.keep(asked[new], waypoints[new], join_crossings(found).in_order())
-    return [*found, *(one for one in remembered if one is not None)]
 
 
 def _halve_in_turn(

@@ -3,65 +3,25 @@
 
 What the model finds at a pose depends on pose and motion alone, and on the ground near the pose.
 A path is made of pieces that were judged before, and after a change of the map most of it is as it
-was. What is found between two neighbouring waypoints depends on both of them, and is remembered as
-long as the map stays.
+was.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.path_kernels import Crossings
 from rover_physics.results.record import RESULT, numbers_of, place_results, unwritten_results
 
 MOST = 20_000
 """Number of poses that are remembered; beyond, the oldest are forgotten. A pose takes 1.6 kB."""
-ASKED, STRETCH = np.dtype("V48"), np.dtype("V96")
-"""The numbers of a pose and of its motion as one value, and those of two waypoints."""
+ASKED = np.dtype("V48")
+"""The numbers of a pose and of its motion as one value."""
 
 Evaluate = Callable[[Floats, Floats], np.ndarray]
 """Returns RESULTs (n,) of poses (n, 3) with motions (n, 3)."""
-
-
-class KnownStretches:
-    """Poses between neighbouring waypoints, by poses and motions of both."""
-
-    def __init__(self, most: int = MOST):
-        """Begin with none; `most` is the number of poses that are remembered."""
-        self._most, self._poses = most, 0
-        self._found: dict[bytes, Crossings] = {}
-
-    def __len__(self) -> int:
-        return self._poses
-
-    def recall(self, ends: Floats, waypoints: NDArray[np.int64]) -> Iterator[Crossings | None]:
-        """Yield the poses of stretches, None of those that are not known.
-
-        `ends` (n, 12) are pose and motion of the two waypoints, `waypoints` (n,) their place on
-        the path: the indices of the second ones.
-        """
-        for key, waypoint in zip(_keys(ends, STRETCH), waypoints.tolist(), strict=True):
-            found = self._found.get(key)
-            yield None if found is None else found.shift(waypoint)
-
-    def keep(self, ends: Floats, waypoints: NDArray[np.int64], found: Crossings) -> None:
-        """Keep what was found of stretches, as for `recall`; in the order of the path."""
-        bounds = np.searchsorted(found.waypoint, [waypoints, waypoints + 1]).T.tolist()
-        keys = _keys(ends, STRETCH)
-        for key, waypoint, (first, end) in zip(keys, waypoints.tolist(), bounds, strict=True):
-            if key not in self._found:
-                rows = Crossings._make(part[first:end] for part in found)
-                self._found[key] = rows.shift(-waypoint)
-                self._poses += 1 + end - first
-        while self._poses > self._most:
-            self._poses -= 1 + len(self._found.pop(next(iter(self._found))).place)
-
-    def forget(self) -> None:
-        """Forget all."""
-        self._found, self._poses = {}, 0
 
 
 class KnownPoses:
@@ -73,8 +33,6 @@ class KnownPoses:
         What is not known, `others` of the same model may know.
         """
         self._others = others
-        self.stretches: KnownStretches = KnownStretches() if others is None else others.stretches
-        """What is known between waypoints."""
         self._rows: dict[bytes, int] = {}
         self._keys: list[bytes] = [b""] * most
         self._places = np.empty((most, 2))
@@ -88,7 +46,7 @@ class KnownPoses:
         """
         if self._others is not None:
             evaluate = partial(self._others.complete, evaluate=evaluate)
-        keys = _keys(np.hstack([poses, motions]), ASKED)
+        keys = np.hstack([poses, motions]).view(ASKED)[:, 0].tolist()
         known = np.array([self._rows.get(key, -1) for key in keys], np.int64)
         new = np.flatnonzero(known < 0)
         if len(new) == len(keys):
@@ -101,8 +59,7 @@ class KnownPoses:
         return results
 
     def forget(self, are_near: Callable[[Floats], NDArray[np.bool_]]) -> None:
-        """Forget the poses of which `are_near` is True at x, y (n, 2) [m], and all stretches."""
-        self.stretches.forget()
+        """Forget the poses of which `are_near` is True at x, y (n, 2) [m]."""
         rows = np.fromiter(self._rows.values(), np.int64, len(self._rows))
         for row in rows[are_near(self._places[rows])].tolist():
             del self._rows[self._keys[row]]
@@ -120,9 +77,3 @@ class KnownPoses:
             self._rows[key], self._keys[row] = row, key
         self._places[to], numbers_of(self._results)[to] = places, numbers_of(results)[rows]
         self._next = (self._next + len(rows)) % most
-
-
-def _keys(numbers: Floats, kind: np.dtype) -> list[bytes]:
-    """Return rows of numbers, each as one value."""
-    keys: list[bytes] = numbers.view(kind)[:, 0].tolist()
-    return keys

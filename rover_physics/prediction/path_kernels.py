@@ -84,11 +84,8 @@ class Crossings(NamedTuple):
     def between(self, first: int, end: int, start: int = 0) -> "Crossings":
         """Return the poses from waypoint `first` up to `end`, counted from `start` on."""
         rows = slice(*np.searchsorted(self.place, (first, end)))
-        return Crossings._make(part[rows] for part in self).shift(start - first)
-
-    def shift(self, waypoints: int) -> "Crossings":
-        """Return the poses so many waypoints further on."""
-        return self._replace(place=self.place + waypoints, waypoint=self.waypoint + waypoints)
+        place, waypoint, *rest = (part[rows] for part in self)
+        return Crossings(place + (start - first), waypoint + (start - first), *rest)
 
     def reversed(self, waypoints: int) -> "Crossings":
         """Return the poses as they lie on the reversed path of that many waypoints."""

@@ -195,7 +195,8 @@ def _find_drift(course: _Course) -> Floats:
     sums = np.zeros(rate.shape)
     sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * course.distances[:, None], axis=0)
     place = np.append(0.0, np.cumsum(course.distances))
-    built_up = sums - sums[np.searchsorted(place, place - course.rover.wheelbase)]
+    begin = place - course.rover.wheelbase
+    built_up = sums - np.column_stack([np.interp(begin, place, one) for one in sums.T])
     n = len(poses)
     owner = np.append(np.arange(n), turns.waypoint)[course.order]
     found = np.column_stack([np.abs(built_up[:, 2]), np.hypot(built_up[:, 0], built_up[:, 1])])

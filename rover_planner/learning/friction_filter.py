@@ -25,11 +25,9 @@ LEAST = 1e-3
 """Use of friction below which a bound tells nothing."""
 COMMON = 0.04
 """Standard deviation of what all measurements have in common, relative: masses, radius."""
-OUTLIERS, OUTLIER_NOISE = 0.15, 0.25
-"""Share of measurements that tell little, such as of a wheel between two contacts, and their
-relative standard deviation."""
-WORTHLESS = 0.01
-"""Share of measurements that tell nothing."""
+FREEDOM = 5.0
+"""Degrees of freedom of a measurement's error: Student's t has heavy tails, for wheels between two
+contacts."""
 CHANGE = 0.05
 """Chance that the ground changes on a metre."""
 MEMORY = 2.0
@@ -89,13 +87,8 @@ class FrictionFilter:
             noise: Standard deviation of the use, relative.
             weight: Number of independent measurements that this one is.
         """
-        error = np.log(max(use, LEAST) / GRID)
-        usual, rough = (
-            np.exp(-0.5 * (error / spread) ** 2) / spread
-            for spread in (noise, np.hypot(OUTLIER_NOISE, noise))
-        )
-        mixed = (1.0 - OUTLIERS - WORTHLESS) * usual + OUTLIERS * rough + WORTHLESS
-        self._update(mixed**weight)
+        error = np.log(max(use, LEAST) / GRID) / noise
+        self._update((1.0 + error**2 / FREEDOM) ** (-0.5 * (FREEDOM + 1.0) * weight))
         self._slips += weight
 
     def grip(self, use: float) -> None:

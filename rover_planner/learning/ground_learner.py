@@ -52,8 +52,8 @@ CERTAIN = 5.0
 """Standard deviations by which a slip must exceed zero."""
 ALONG = 0.85
 """Share of a slip along the heading above which the torque shows the shear."""
-MIN_LOAD, MAX_LOAD = 0.3, 4.0
-"""Loads of wheels that count, in sixths of the weight."""
+MIN_LOAD = 0.3
+"""Load from which a wheel counts, in sixths of the weight."""
 MOST_STICKING = 0.3
 """Fluctuation of a torque over its mean, times 1 less the slip ratio, from which a wheel sticks
 and slips by turns; its mean shear is then below the friction."""
@@ -66,10 +66,8 @@ AT_A_PLACE = 2.0
 half of the variance of their errors is common."""
 SAME_TIME = 0.2
 """Time within which its measurements are not independent, either [s]."""
-LEAST_NOISE, FLUCTUATION_NOISE = 0.10, 0.4
-"""Relative noise of one wheel's shear over its load while the torque is steady, and per square of
-the fluctuation of the torque over its mean: what a mean lacks as shears turn and stick is of
-second order."""
+LEAST_NOISE = 0.10
+"""Relative noise of one wheel's shear over its load while the torque is steady."""
 HIDDEN_SHARE = 0.2
 """Error of the load of the wheels that slip, over what tractions push beyond what holds the rover:
 they push at a contact that the map does not have."""
@@ -346,7 +344,7 @@ class GroundLearner:
         unit = self._sense.weight / WHEEL_COUNT
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
-        counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
+        counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit)
         # No ground pulls: where a load says so, the balance is wrong for all wheels.
         counts &= bool((loads + window.doubts).min() > -MIN_LOAD * unit)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
@@ -361,7 +359,7 @@ class GroundLearner:
         proves = grips & counts & (np.abs(window.slip) < most) & is_right
         proved = np.maximum(np.abs(tractions) - CERTAIN_GRIP * error, 0.0)
         shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
-        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * fluctuation**2)
+        noises = loads * np.hypot(LEAST_NOISE, error / np.maximum(np.abs(tractions), 1e-9))
         for one, own in grounds:
             if own.any():
                 one.drive(distance)

@@ -3,7 +3,6 @@
 
 import math
 import re
-from dataclasses import dataclass
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -14,29 +13,14 @@ REPEAT_PERIOD = 10.0
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
-@dataclass
-class _Condition:
-    """State of a condition."""
-
-    holds: bool = False
-    """True if it held at the last look."""
-    changed: bool = False
-    """True if it has changed since the last line."""
-    logged_at: float = -math.inf
-    """Time of the last line [s]."""
-    logged: bool = False
-    """True if the last line said that it held."""
-    passed: str = ""
-    """The reason why it held last."""
-
-
 class TransitionLog:
     """Logs changes of conditions; those within QUIET_TIME of a line share one line after it."""
 
     def __init__(self, logger: RcutilsLogger):
         """Log to a node's logger."""
         self._logger = logger
-        self._conditions: dict[str, _Condition] = {}
+        self._logged: dict[str, float] = {}  # time of the last line about each condition [s]
+        self._reasons: dict[str, list[str]] = {}  # of that line, and of each change since
 
     def update(self, name: str, reason: str, end: str, now: float) -> None:
         """Log a change of a condition.
@@ -47,20 +31,19 @@ class TransitionLog:
             end: Text that says that it has ended.
             now: Monotonic time [s].
         """
-        condition = self._conditions.setdefault(name, _Condition())
-        condition.passed = reason or condition.passed
-        if bool(reason) != condition.holds:
-            condition.holds, condition.changed = bool(reason), True
-        if not condition.changed or now - condition.logged_at < QUIET_TIME:
+        reasons = self._reasons.setdefault(name, [""])
+        if bool(reason) != bool(reasons[-1]):
+            reasons.append(reason)
+        reasons[-1] = reason
+        if len(reasons) == 1 or now - self._logged.get(name, -math.inf) < QUIET_TIME:
             return
-        condition.changed, condition.logged_at = False, now
-        was_logged, condition.logged = condition.logged, bool(reason)
+        self._logged[name], self._reasons[name] = now, [reason]
         if reason:
             self._logger.warning(reason)
-        elif was_logged:
+        elif reasons[0]:
             self._logger.info(end)
         else:
-            self._logger.info(f"{end}; it was for less than {QUIET_TIME:g} s: {condition.passed}")
+            self._logger.info(f"{end}; it was for less than {QUIET_TIME:g} s: {reasons[-2]}")
 
 
 class RepeatLog:

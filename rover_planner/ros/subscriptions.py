@@ -127,19 +127,18 @@ class PublisherCheck:
             advice: What to do about publishers of other types, by type.
         """
         self._node, self._types, self._advice = node, types, advice
-        self._logged: set[str] = set()
         self.problems: tuple[str, ...] = ()
         """The problems found last."""
         create_steady_timer(node, PERIOD, self._check)
 
     def _check(self) -> None:
+        before = self.problems
         self.problems = tuple(
             problem for topic in self._types for problem in self._find_problems(topic)
         )
         for problem in self.problems:
-            if problem not in self._logged:
+            if problem not in before:
                 self._node.get_logger().warning(problem)
-        self._logged = set(self.problems)
 
     def _find_problems(self, topic: str) -> list[str]:
         """Return the problems of a topic's publishers, each once."""

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.angles import wrap
-from rover_planner.nodes.mission.errors import DriveFailedError
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
 
@@ -34,6 +33,10 @@ STILL = 0.02
 """Motion below which a rover stands [m]; a turn counts as in `WatchedPath`."""
 SAME_PLACE = 0.1
 """Distance below which two stops are at one place [m]."""
+
+
+class DriveFailedError(Exception):
+    """The rover did not reach the end of its path; the text names the reason."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,6 @@ from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
-from rover_planner.nodes.mission.errors import NoAnswerError
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.ros.qos import map_qos, result_qos, service_qos, topic_qos
 
@@ -39,6 +38,10 @@ SERVER = "traverse_server"
 another one."""
 TEXTS = ("_hash", "_stamp", "server")
 """Ends of keys whose values are texts, even if they look like numbers."""
+
+
+class NoAnswerError(Exception):
+    """What a node waits for did not come in time; the text names it."""
 
 
 @dataclass(frozen=True, eq=False)

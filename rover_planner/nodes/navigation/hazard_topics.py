@@ -55,12 +55,11 @@ class HazardTopics:
             give_way: As `QuestionDesk.give_way`: questions come first.
         """
         self._node, self._service, self._give_way = node, service, give_way
+        self._hazards: HazardMap | None = None  # set in the executor's thread
         self._shown: _Shown | None = None
-        self._done: tuple[Terrain, ServiceSettings] | None = None
+        self._done: tuple[HazardMap, Terrain, ServiceSettings] | None = None
         self._topics: dict[str, LazyPublisher] = {}
         node.create_service(GetMap, "~/get_hazard_map", self._get)
-        self._withdrawals = 0
-        self._enabled = threading.Event()
         self._ending = threading.Event()
         self._patience = 0.0
         self.apply()
@@ -70,19 +69,23 @@ class HazardTopics:
     def apply(self) -> None:
         """Follow the parameter `hazard_map`; without it the topics do not come into being."""
         if not self._node.values.hazard_map:
-            self._enabled.clear()
+            self._hazards = None
             self._withdraw()
-            return
-        headings = (f"heading_{k}" for k in range(self._node.values.hazard_headings))
-        for name in ("worst", "best", *headings):
-            if name not in self._topics:
-                topic = LazyPublisher(self._node, OccupancyGrid, f"~/hazard_map/{name}")
-                self._topics[name] = topic
-        self._enabled.set()
+        elif self._hazards is None:
+            headings = (f"heading_{k}" for k in range(self._node.values.hazard_headings))
+            for name in ("worst", "best", *headings):
+                if name not in self._topics:
+                    topic = LazyPublisher(self._node, OccupancyGrid, f"~/hazard_map/{name}")
+                    self._topics[name] = topic
+            self._hazards = HazardMap(self._node.values.hazard_headings)
+
+    def _start_over(self) -> None:
+        """Forget the classes, whose update has failed."""
+        self._hazards = None
+        self.apply()
 
     def _withdraw(self) -> None:
         """Publish that no class is known: nobody judges what changes from now on."""
-        self._withdrawals += 1
         shown, self._shown = self._shown, None
         if shown is None:
             return
@@ -93,24 +96,23 @@ class HazardTopics:
     def close(self) -> None:
         """End the thread."""
         self._ending.set()
-        self._enabled.set()
         self._thread.join(END_TIME)
 
     def describe(self) -> dict[str, Any]:
         """Return keys and values for diagnostics."""
         shown = self._shown
-        if not self._enabled.is_set() or shown is None:
+        if shown is None:
             return {}
         return {"hazard map: cells to judge": shown.stale, "hazard map: map": shown.map_hash}
 
     def _get(self, _request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
         """Return the worst classes; a grid without cells if there are none."""
         shown = self._shown
-        if shown is not None and self._enabled.is_set():
+        if shown is not None:
             response.map = shown.grid("worst")
             return response
         missing = "no cell was judged yet"
-        if not self._enabled.is_set():
+        if self._hazards is None:
             missing = "the parameter hazard_map is false"
         elif self._service.known_map is None:
             missing = "there is no map yet"
@@ -123,34 +125,28 @@ class HazardTopics:
             topic.catch_up()
 
     def _run(self) -> None:
-        hazards = HazardMap(self._node.values.hazard_headings)
-        while not self._ending.is_set():
-            self._enabled.wait()
+        while not self._ending.wait(PERIOD):
             try:
                 with interruptible(self._let_questions_go_first):
-                    self._update(hazards)
+                    self._update(self._hazards)
             except QuestionStoppedError:
                 return
             except RoverError as error:  # such as a soil of the map that is not known
                 self._node.get_logger().warning(f"no hazard map: {error}", once=True)
             except Exception as error:
                 self._node.guard.report("hazard map", error)
-                hazards, self._done = HazardMap(self._node.values.hazard_headings), None
-            self._ending.wait(PERIOD)
+                self._node.handover.call(self._start_over)
 
     def _check_end(self) -> None:
         if self._ending.is_set():
             raise QuestionStoppedError(STOPPING, "the server is shutting down")
 
-    def _update(self, hazards: HazardMap) -> None:
+    def _update(self, hazards: HazardMap | None) -> None:
         """Take the present map, judge what is stale, and publish; newer maps are followed."""
         shown_at, is_done = time.monotonic(), False
-        while not is_done and self._enabled.is_set():
-            withdrawals = self._withdrawals
+        while not is_done and hazards is not None and hazards is self._hazards:
             known, settings = self._service.known_map, self._service.settings
-            if known is None or (
-                self._shown is not None and self._done == (known.terrain, settings)
-            ):
+            if known is None or self._done == (hazards, known.terrain, settings):
                 return
             query = settings.query
             hazards.take(RoverOnMap(settings.rover, known.terrain, query.model, query.map_sigmas))
@@ -159,33 +155,31 @@ class HazardTopics:
             pose = self._service.fresh_pose()
             is_done = hazards.work(SLICE, None if pose is None else (pose[0], pose[1]))
             if is_done:
-                self._done = known.terrain, settings
+                self._done = hazards, known.terrain, settings
             if is_done or time.monotonic() - shown_at > SHOW_PERIOD:
                 shown_at = time.monotonic()
-                self._show(hazards, known.fingerprint, withdrawals)
+                self._show(hazards, known.fingerprint)
 
     def _let_questions_go_first(self) -> None:
         """Wait while there are questions, for MAX_PAUSE in each SLICE; called between poses."""
         self._patience -= self._give_way(self._check_end, self._patience)
 
-    def _show(self, hazards: HazardMap, map_hash: str, withdrawals: int) -> None:
+    def _show(self, hazards: HazardMap, map_hash: str) -> None:
         view = hazards.view()
-        if view is None:
-            return
-        shown = _Shown(view, map_hash, hazards.stale_count, self._make_header())
-        self._node.handover.call(partial(self._publish, shown, withdrawals))
+        if view is not None:
+            shown = _Shown(view, map_hash, hazards.stale_count, self._make_header())
+            self._node.handover.call(partial(self._publish, hazards, shown))
 
     def _make_header(self) -> Header:
         stamp = self._node.get_clock().now().to_msg()
         return Header(frame_id=self._node.values.map_frame, stamp=stamp)
 
-    def _publish(self, shown: "_Shown", withdrawals: int) -> None:
-        """Publish a view, but none of before a withdrawal; called in the executor's thread."""
-        if not self._enabled.is_set() or withdrawals != self._withdrawals:
-            return
-        self._shown = shown
-        for name, topic in self._topics.items():
-            topic.publish(partial(shown.grid, name))
+    def _publish(self, hazards: HazardMap, shown: "_Shown") -> None:
+        """Publish a view of the present hazard map; called in the executor's thread."""
+        if hazards is self._hazards:
+            self._shown = shown
+            for name, topic in self._topics.items():
+                topic.publish(partial(shown.grid, name))
 
 
 @dataclass(frozen=True, eq=False)

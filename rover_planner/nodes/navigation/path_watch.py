@@ -16,7 +16,6 @@ from std_srvs.srv import SetBool
 
 from msg_adapters.results.diagnostics import MONITOR, make_status
 from rover_physics.numerics.interruption import interruptible
-from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement, refuse_for
@@ -30,7 +29,6 @@ from rover_planner.planning.navigation.monitor import (
     PathMonitor,
     Sight,
     describe_watch,
-    rehearse,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.ros.node import RoverNode
@@ -75,7 +73,7 @@ class PathWatch:
         self._node, self._service = node, service
         self._find_pose, self._report_stop = find_pose, report_stop
         self._monitor = PathMonitor()
-        self.finding, self._found_idle = self._monitor.finding, False
+        self.finding = self._monitor.finding
         """The last finding."""
         self.enabled = False
         """True while accepted paths are watched."""
@@ -193,24 +191,7 @@ class PathWatch:
             self._sight = Sight(snapshot, pose, time.monotonic())
             self._changed.notify_all()
 
-    @property
-    def _ends(self) -> bool:
-        """True if the node ends, so that what the thread calls may have ended before it."""
-        return self._life.stopped is not None or not self._node.context.ok()
-
-    def _rehearse(self) -> None:
-        """Look at a path of no meaning, unless that compiles kernels."""
-        try:
-            with interruptible(self._life.check), loading_only():
-                rehearse(self._service.settings)
-        except (KernelMissingError, QuestionStoppedError):
-            return
-        except Exception as error:
-            if not self._ends:
-                self._node.guard.report("monitor", error)
-
     def _run(self) -> None:
-        self._rehearse()
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._sight or self._life.stopped)
@@ -225,8 +206,8 @@ class PathWatch:
             except QuestionStoppedError:
                 return
             except Exception as error:
-                if self._ends:
-                    return
+                if self._life.stopped is not None or not self._node.context.ok():
+                    return  # what the thread calls may have ended before it
                 text = self._node.guard.report("monitor", error)
                 finding = self._monitor.stop(refuse_for(text))
             self._hand_over(finding, sight)
@@ -240,15 +221,8 @@ class PathWatch:
         return self._monitor.look(sight)
 
     def _hand_over(self, finding: Finding, sight: Sight) -> None:
-        """Publish a finding at once; classes of a stop's waypoints take longer and follow.
-
-        Where nothing was watched before nor is now, there is nothing to publish.
-        """
-        was_idle, self._found_idle = self._found_idle, finding.state == IDLE
-        if was_idle and self._found_idle:
-            self.finding, self._looked = finding, time.monotonic()
-        else:
-            self._node.handover.call(lambda: self._take(finding))
+        """Publish a finding at once; classes of a stop's waypoints take longer and follow."""
+        self._node.handover.call(lambda: self._take(finding))
         judgement = finding.judgement
         if finding.state != STOPPED or judgement is None or judgement is self._reported:
             return

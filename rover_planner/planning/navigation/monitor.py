@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
-from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.answering.judgement import PathJudgement, SuspensionReport, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -257,22 +255,6 @@ class PathMonitor:
                 if not judgement.traversable:
                     return judgement
         return _check(snapshot, path.poses[first:])
-
-
-def rehearse(settings: ServiceSettings) -> None:
-    """Look once, at level ground that is not known exactly, so that no later look takes longer."""
-    flat = np.zeros((120, 120))
-    ground = Terrain(flat, 0.05, (-3.0, -3.0), elevation_std=flat + 0.001)
-    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros((41, 2))])
-    snapshot = Snapshot(
-        settings,
-        joints=dict.fromkeys(SUSPENSION_JOINTS, 0.0),
-        known_map=KnownMap(ground, ground, "", None, 0.0, ""),
-        measured_pose=poses[0],
-    )
-    monitor, sight = PathMonitor(), Sight(snapshot, poses[0], 0.0)
-    monitor.take_path(WatchedPath(poses), sight)
-    monitor.look(sight)
 
 
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:

@@ -21,7 +21,7 @@ from rover_planner.nodes.traction_controller import NODE_NAME, TractionControlle
 from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros.node import create_steady_timer
 from rover_planner.ros.qos import sensor_qos
-from support.ros_fixtures import PATIENT
+from support.ros_fixtures import PATIENT, hear
 from support.waiting import wait_until
 
 RATE = 50.0
@@ -45,37 +45,26 @@ class DrivenRover(Node):
         """Returns a header stamp [ns]."""
         self.commands: list[tuple[int, float, float]] = []
         """Time at which each was sent [ns], largest magnitude and sum of its torques [N m]."""
-        self.state = ""
-        """The last state of the controller."""
-        self.status: Any = DiagnosticStatus()
-        """Its last status on diagnostics."""
-        self.brakes: list[bool] = []
-        self.log: list[str] = []
         self._sent_at = 0
         self._senders = {
             "joint_states": self.create_publisher(JointState, "joint_states", sensor_qos()),
             "imu": self.create_publisher(Imu, "imu", sensor_qos()),
         }
-        self._listen()
+        queue = QoSProfile(depth=QUEUE)
+        latched = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.create_subscription(
+            Float64MultiArray, f"{NODE_NAME}/commands", self._hear_command, queue
+        )
+        self._states = hear(self, String, f"{NODE_NAME}/state", latched)
+        self._brakes = hear(self, Bool, f"{NODE_NAME}/brake", latched)
+        self._diagnostics = hear(self, DiagnosticArray, "diagnostics", queue)
+        self._log = hear(self, Log, "/rosout", latched)
         create_steady_timer(self, 1.0 / RATE, self._send)
 
     def send_twists(self, kind: type = TwistStamped) -> None:
         """Send cmd_vel of a type from now on."""
         self.twist = kind()
         self._senders["cmd_vel"] = self.create_publisher(kind, "cmd_vel", sensor_qos())
-
-    def _listen(self) -> None:
-        """Subscribe to what the controller publishes."""
-        latched = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        queue = QoSProfile(depth=QUEUE)
-        for kind, name, hear, qos in (
-            (Float64MultiArray, f"{NODE_NAME}/commands", self._hear_command, queue),
-            (String, f"{NODE_NAME}/state", self._hear_state, latched),
-            (Bool, f"{NODE_NAME}/brake", lambda m: self.brakes.append(m.data), latched),
-            (DiagnosticArray, "diagnostics", self._hear_diagnostics, queue),
-            (Log, "/rosout", self._hear_log, latched),
-        ):
-            self.create_subscription(kind, name, hear, qos)
 
     def _send(self) -> None:
         self._sent_at = time.time_ns()
@@ -94,17 +83,27 @@ class DrivenRover(Node):
         sent = info["source_timestamp"]
         self.commands.append((sent, max(map(abs, torques)), sum(torques)))
 
-    def _hear_state(self, message: String) -> None:
-        self.state = message.data
+    @property
+    def state(self) -> str:
+        """The last state of the controller."""
+        return self._states[-1].data if self._states else ""
 
-    def _hear_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            if status.name.startswith(NODE_NAME):
-                self.status = status
+    @property
+    def brakes(self) -> list[bool]:
+        """The states of its brake."""
+        return [brake.data for brake in self._brakes]
 
-    def _hear_log(self, message: Log) -> None:
-        if NODE_NAME in message.name:
-            self.log.append(message.msg)
+    @property
+    def status(self) -> Any:
+        """Its last status on diagnostics."""
+        told = [one for message in self._diagnostics for one in message.status]
+        mine = [one for one in told if one.name.startswith(NODE_NAME)]
+        return mine[-1] if mine else DiagnosticStatus()
+
+    @property
+    def log(self) -> list[str]:
+        """The lines of its log."""
+        return [line.msg for line in self._log if NODE_NAME in line.name]
 
     @property
     def values(self) -> dict[str, str]:

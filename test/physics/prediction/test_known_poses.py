@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path, judge_pieces
-from rover_physics.prediction import crossing
-from rover_physics.prediction.known_poses import KnownPoses, KnownStretches
+from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import FIRST_BLOCK
 from rover_physics.results.record import numbers_of
@@ -60,36 +59,6 @@ def test_a_path_of_judged_pieces_is_hardly_evaluated_again(asked):
     for known in (of_pieces, KnownPoses(others=of_pieces)):
         judge_path(LSR1, GROUND, EASY, known=known)
     assert asked.poses - before < 0.1 * before
-
-
-@pytest.mark.parametrize("policy", ["equal", "servo"])
-def test_stretches_between_waypoints_are_not_searched_again_before_the_map_changes(
-    policy, monkeypatch
-):
-    searched, halve = [], crossing._halve
-    monkeypatch.setattr(crossing, "_halve", lambda *asked: searched.append(asked) or halve(*asked))
-    options, known = SweepOptions(policy=policy), KnownPoses()
-    judge_pieces(LSR1, GROUND, [EASY[:51], EASY[50:]], options, known=known)
-
-    def count_searched(known=None):
-        searched.clear()
-        judged = judge_path(LSR1, GROUND, EASY, options, stop_at_failure=True, known=known)
-        return len(searched), judged
-
-    often, (prediction, verdict) = count_searched()
-    seldom, again = count_searched(known)
-    assert seldom < often and repr(again[1]) == repr(verdict)
-    assert_same(again[0], prediction)
-    known.forget(lambda places: np.zeros(len(places), bool))
-    assert count_searched(known)[0] == often
-
-
-def test_the_oldest_stretches_are_forgotten():
-    known = KnownPoses()
-    known.stretches = KnownStretches(most=20)
-    for path in (EASY, EASY, poses_at(X, -0.21)):
-        judge_pieces(LSR1, GROUND, [path, path], known=known)
-        assert 0 < len(known.stretches) <= 20
 
 
 def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(asked):

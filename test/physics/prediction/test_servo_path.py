@@ -92,3 +92,11 @@ def test_a_turn_about_a_wheel_costs_the_power_of_the_wheels_in_its_time():
     path = arc_of(1.0 / radius, np.linspace(0.0, 0.4, 41))
     found = judge_path(LSR1, fractal(4), path, SERVO)[0]
     assert found.energy[-1] == pytest.approx(np.trapezoid(found.power, found.time), rel=0.15)
+
+
+def test_drift_on_an_even_slope_builds_up_over_a_wheelbase_whatever_rounding_makes_of_it():
+    path, options = poses_at(np.linspace(-1.2, 1.2, 61)), replace(SERVO, friction=0.4)
+    found = judge_path(ROVER, plane(0.0, 0.25, half=2.0), path, options)[0]
+    slide = found.results["drift"][25:, 1]
+    assert slide[0] > 0.0
+    assert slide == pytest.approx(slide[0], rel=1e-6)
