@@ -15,7 +15,8 @@ class MapKeeper:
     def __init__(self, rover: Rover, values: TraverseServerParameters):
         self._rover, self._living = rover, LivingMap(values)
         self._start: GroundBeneath | None = None
-        self._taken = ""  # fingerprint of the local map that is there alone, but for what is filled
+        self._taken = ""
+        """Fingerprint of the local map that is there alone, but for what is filled; or empty."""
 
     def apply(self, rover: Rover, values: TraverseServerParameters) -> None:
         """Use another rover and other parameters from now on; the map stays."""
