@@ -4,10 +4,10 @@
 The unknowns are the six wheel loads and the rover's motion (forward, left, turning) on its
 contacts, see servo_motion. Where no load keeps a wheel down, its speed of lifting takes the place
 of the load: the treads of the others then move so much differently that the forces balance. The
-motion gives the sliding velocity of each wheel and with it the friction force, by servo_wheel or,
-on yielding soil, by servo_ground. The nine equations are those of equilibrium. A wheel that has to
-travel farther than its neighbours is dragged, and others push; a wheel at its friction or torque
-limit leaves the rest to the others; wheels that cannot roll where they are moved skid.
+motion gives the sliding velocity of each wheel and with it the force of firm ground or yielding
+soil, see servo_wheel. The nine equations are those of equilibrium. A wheel that has to travel
+farther than its neighbours is dragged, and others push; a wheel at its friction or torque limit
+leaves the rest to the others; wheels that cannot roll where they are moved skid.
 
 servo_balance.py has the equations, servo_search.py the search of their solution.
 """

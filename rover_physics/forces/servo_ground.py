@@ -94,22 +94,22 @@ def tread_under(servo, wheel, load):
 
 
 @kernel
-def shear_stiffness(tread, rim, sigma):
-    """Return the stiffness of the shear force on a point against its sliding velocity.
+def shear_stiffness(tread, rim, squared):
+    """Return the shear force on a point over its sliding velocity sigma, with derivatives.
+
+    They are by sigma^2, by the rim's speed and by the load.
 
     Args:
         tread: Tread.
         rim: Velocity of the rim, r omega.
-        sigma: Sliding velocity of the point, at least 0.
-
-    Returns:
-        Secant, the force over sigma; tangent, its derivative by sigma; derivatives of the secant
-        by the rim's speed and by the load.
+        squared: sigma^2.
     """
     if not tread.yields:
-        size = np.sqrt(sigma * sigma + tread.creep * tread.creep)
-        secant, near = tread.strength / size, tread.creep / size
-        return secant, secant * near * near, 0.0, tread.strength_rate / size
+        size = squared + tread.creep * tread.creep
+        root = np.sqrt(size)
+        stiffness = tread.strength / root
+        return stiffness, -0.5 * stiffness / size, 0.0, tread.strength_rate / root
+    sigma = np.sqrt(squared)
     slow = abs(rim) <= tread.creep * tread.length
     scale = tread.creep if slow else abs(rim) / tread.length
     if sigma >= scale * tread.length:  # slip 1: the whole contact has slid its length
@@ -122,8 +122,10 @@ def shear_stiffness(tread, rim, sigma):
         tangent = rate / scale
         by_rim = 0.0 if slow else -tangent / rim  # the force depends on sigma / rim alone
         by_length = 0.0 if slow else tangent / tread.length
+    by_squared = 0.5 * (tangent - secant) / squared if squared > 0.0 else 0.0
     by_load = tread.strength_rate * secant + tread.strength * tread.length_rate * by_length
-    return tread.strength * secant, tread.strength * tangent, tread.strength * by_rim, by_load
+    strength = tread.strength
+    return strength * secant, strength * by_squared, strength * by_rim, by_load
 
 
 @kernel

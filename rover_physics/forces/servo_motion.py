@@ -63,7 +63,7 @@ SERVO_STATE = record_type(
     ("step", float, (UNKNOWNS, 1)),
     ("J", float, (UNKNOWNS, UNKNOWNS)),  # derivatives of the residual by z
     ("force", float, (6, 3)),  # traction, lateral force, scrub force of each wheel
-    ("force_rate", float, (6, 3, 5)),  # their derivatives, see servo_wheel
+    ("force_rate", float, (6, 3, 4)),  # their derivatives, see servo_wheel
     ("softness", float),  # width of the transition from load to lifting; 0 in the solution
     ("load", float, (6,)),  # loads over the weight
     ("load_rate", float, (6,)),  # their derivatives by z

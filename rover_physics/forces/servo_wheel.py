@@ -12,6 +12,8 @@ the traction of full torque; at its torque limit the wheel slows down until the 
 more.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rover_physics.forces.servo_ground import direction_of_travel, shear_stiffness, tread_under
@@ -28,6 +30,17 @@ T, S, D = range(3)
 ALONG, ACROSS, SPIN, LOAD, RIM = range(5)
 """What these forces depend on: velocity of the contact along and across the wheel, half the
 difference of the two points' velocities, load, and r omega, which follows from the others."""
+
+
+class Shear(NamedTuple):
+    """Shear force on a point of the tread, and derivatives by ALONG to RIM, each of them alone."""
+
+    pull: float
+    """Force along the wheel."""
+    side: float
+    """Force across it."""
+    pull_rate: tuple[float, float, float, float, float]
+    side_rate: tuple[float, float, float, float, float]
 
 
 @kernel
@@ -51,59 +64,71 @@ def roll_wheel(servo, wheel, velocity):
         return
     tread = tread_under(servo, wheel, load)
     facing, turning = direction_of_travel(along, servo.creep)
+    resistance = tread.resistance * facing
+    resistance_rate = tread.resistance * turning, 0.0, 0.0, tread.resistance_rate * facing
     unused = 1.0 - servo.friction_share
-    extra = unused * tread.resistance * facing
     held, gain = 1.0, servo.droop / servo.full_traction
-    rim = _rim_of_servo(tread, velocity, gain, servo.command[wheel], extra, servo.slip[wheel])
-    _write_shear(tread, velocity, rim, force, rate)
-    way = np.copysign(1.0, force[T] + extra)
-    limit = way * servo.max_traction
-    if way * (force[T] + extra) > servo.max_traction:
+    command = servo.command[wheel] - gain * unused * resistance
+    known = along - servo.slip[wheel]
+    rim, shear = _rim_of_servo(tread, velocity, gain, command, known)
+    thrust = shear + unused * resistance
+    if abs(thrust) > servo.max_traction:
         held, gain = 0.0, 1.0
-        rim = _rim_of_pull(tread, velocity, limit - extra, rim, way)
-        _write_shear(tread, velocity, rim, force, rate)
+        way = np.copysign(1.0, thrust)
+        thrust = way * servo.max_traction
+        rim = _rim_of_pull(tread, velocity, thrust - unused * resistance, way, rim, known)
     servo.slip[wheel] = along - rim
-    force[T] += extra
-    rate[T, ALONG] += unused * tread.resistance * turning
-    rate[T, LOAD] += unused * tread.resistance_rate * facing
-    _follow_rim(rate, held, gain)
-    if held == 0.0:
-        force[T] = limit
-        rate[T, :] = 0.0
-    force[T] -= tread.resistance * facing
-    rate[T, ALONG] -= tread.resistance * turning
-    rate[T, LOAD] -= tread.resistance_rate * facing
+    one = _shear_on(tread, velocity, rim, 1.0)
+    two = _shear_on(tread, velocity, rim, -1.0)
+    force[T] = thrust - resistance
+    force[S] = one.side + two.side
+    force[D] = one.pull - two.pull
+    # r omega is the root of held r + gain thrust = const. (implicit function theorem).
+    slope = held + gain * (one.pull_rate[RIM] + two.pull_rate[RIM])
+    share = gain / slope if slope > 0.0 else 0.0
+    side_by_rim = one.side_rate[RIM] + two.side_rate[RIM]
+    for k in range(RIM):
+        back = unused * resistance_rate[k]
+        rim_rate = -share * (one.pull_rate[k] + two.pull_rate[k] + back)
+        first = one.pull_rate[k] + rim_rate * one.pull_rate[RIM]
+        second = two.pull_rate[k] + rim_rate * two.pull_rate[RIM]
+        rate[T, k] = held * (first + second + back) - resistance_rate[k]
+        rate[S, k] = one.side_rate[k] + two.side_rate[k] + rim_rate * side_by_rim
+        rate[D, k] = first - second
 
 
 @kernel
-def _rim_of_servo(tread, velocity, droop, command, extra, slip):
-    """Return the root r of r + droop (F_x(r) + extra) = command.
+def _rim_of_servo(tread, velocity, droop, command, known):
+    """Return the root r of r + droop F_x(r) = command, and F_x(r); `known` is a guess, or NaN.
 
-    `slip` is what it was in the last search, or NaN.
+    Where the rim is as fast as the contact, F_x is 0.
     """
-    loaded = command - droop * (_thrust(tread, velocity, command)[0] + extra)
-    low, high = min(command, loaded), max(command, loaded)
-    known = velocity[ALONG] - slip
+    most, along = 2.0 * droop * tread.strength, velocity[ALONG]
+    low = max(min(command, along), command - most)
+    high = min(max(command, along), command + most)
     guess = known if low < known < high else 0.5 * (low + high)
-    return _find_root(tread, velocity, 1.0, droop, command - droop * extra, low, high, guess)
+    return _find_root(tread, velocity, 1.0, droop, command, low, high, guess)
 
 
 @kernel
-def _rim_of_pull(tread, velocity, pull, rim, way):
-    """Return the root r of F_x(r) = pull; at `rim` F_x is more in the direction `way`, 1 or -1."""
+def _rim_of_pull(tread, velocity, pull, way, rim, known):
+    """Return the root r of F_x(r) = pull; `known` is a guess, or NaN.
+
+    At `rim` F_x is more in the direction `way`, 1 or -1.
+    """
     still = velocity[ALONG] - way * abs(velocity[SPIN])  # F_x is 0, or against `way`
-    far = min(still, rim - 1.0) if way > 0.0 else max(still, rim + 1.0)
-    if way * (_thrust(tread, velocity, far)[0] - pull) > 0.0:
-        far = -way * FASTEST
+    far = still if way * pull >= 0.0 else -way * FASTEST
     low, high = min(far, rim), max(far, rim)
-    return _find_root(tread, velocity, 0.0, 1.0, pull, low, high, 0.5 * (low + high))
+    guess = known if low < known < high else 0.5 * (low + high)
+    return _find_root(tread, velocity, 0.0, 1.0, pull, low, high, guess)[0]
 
 
 @kernel
 def _find_root(tread, velocity, held, gain, target, low, high, rim):
-    """Return the root r of held r + gain F_x(r) = target between two bounds; `rim` is a guess.
+    """Return the root r of held r + gain F_x(r) = target between two bounds, and F_x(r).
 
-    Newton's method, with bisection where it leaves the bounds or does not halve its step.
+    `rim` is a guess. Newton's method, with bisection where it leaves the bounds or does not halve
+    its step.
     """
     change = 2.0 * (high - low)
     for _ in range(MAX_STEPS):
@@ -117,10 +142,11 @@ def _find_root(tread, velocity, held, gain, target, low, high, rim):
         if not low < new < high or abs(new - rim) > 0.5 * change:
             new = 0.5 * (low + high)
         change = abs(new - rim)
+        thrust += rate * (new - rim)
         rim = new
         if change <= RIM_PRECISION:
             break
-    return rim
+    return rim, thrust
 
 
 @kernel
@@ -130,59 +156,28 @@ def _thrust(tread, velocity, rim):
     thrust, rate = 0.0, 0.0
     for sign in (1.0, -1.0):
         ahead = rim - along - sign * spin
-        sigma = np.sqrt(ahead * ahead + across * across)
-        secant, tangent, by_rim, _ = shear_stiffness(tread, rim, sigma)
-        cosine = ahead / sigma if sigma > 0.0 else 1.0
-        thrust += secant * ahead
-        rate += secant + (tangent - secant) * cosine * cosine + by_rim * ahead
+        squared = ahead * ahead + across * across
+        stiffness, by_squared, by_rim, _ = shear_stiffness(tread, rim, squared)
+        thrust += stiffness * ahead
+        rate += stiffness + (2.0 * by_squared * ahead + by_rim) * ahead
         if spin == 0.0:
             return 2.0 * thrust, 2.0 * rate
     return thrust, rate
 
 
 @kernel
-def _write_shear(tread, velocity, rim, force, rate):
-    """Write forces (3,) of the shear on the two points, and derivatives (3, 5) at this rim speed.
-
-    Along its sliding velocity a point has the tangent stiffness, and across it the secant one.
-    """
+def _shear_on(tread, velocity, rim, sign):
+    """Return the Shear on a point; `sign` is 1 for the one with SPIN in its velocity, or -1."""
     along, across, spin = velocity
-    force[:] = 0.0
-    rate[:, :] = 0.0
-    for sign in (1.0, -1.0):
-        ahead = rim - along - sign * spin
-        sigma = np.sqrt(ahead * ahead + across * across)
-        secant, tangent, by_rim, by_load = shear_stiffness(tread, rim, sigma)
-        cosine, sine = 1.0, 0.0
-        if sigma > 0.0:
-            cosine, sine = ahead / sigma, across / sigma
-        lengthwise = tangent * cosine * cosine + secant * sine * sine
-        crosswise = tangent * sine * sine + secant * cosine * cosine
-        skew = (tangent - secant) * cosine * sine
-        pull, side = secant * ahead, -secant * across
-        pull_rate = -lengthwise, skew, -sign * lengthwise, by_load * ahead
-        side_rate = skew, -crosswise, sign * skew, -by_load * across
-        force[T] += pull
-        force[S] += side
-        force[D] += sign * pull
-        for k in range(RIM):
-            rate[T, k] += pull_rate[k]
-            rate[S, k] += side_rate[k]
-            rate[D, k] += sign * pull_rate[k]
-        rate[T, RIM] += lengthwise + by_rim * ahead
-        rate[S, RIM] -= skew + by_rim * across
-        rate[D, RIM] += sign * (lengthwise + by_rim * ahead)
-
-
-@kernel
-def _follow_rim(rate, held, gain):
-    """Add to derivatives (3, 5) what the rim's speed r changes with ALONG, ACROSS, SPIN and LOAD.
-
-    It is the root of held r + gain thrust = const. (implicit function theorem).
-    """
-    slope = held + gain * rate[T, RIM]
-    if slope > 0.0:
-        for k in range(RIM):
-            change = -gain * rate[T, k] / slope
-            for i in range(3):
-                rate[i, k] += change * rate[i, RIM]
+    ahead = rim - along - sign * spin
+    squared = ahead * ahead + across * across
+    stiffness, by_squared, by_rim, by_load = shear_stiffness(tread, rim, squared)
+    lengthwise = stiffness + 2.0 * by_squared * ahead * ahead
+    crosswise = stiffness + 2.0 * by_squared * across * across
+    skew = 2.0 * by_squared * ahead * across
+    return Shear(
+        stiffness * ahead,
+        -stiffness * across,
+        (-lengthwise, skew, -sign * lengthwise, by_load * ahead, lengthwise + by_rim * ahead),
+        (skew, -crosswise, sign * skew, -by_load * across, -skew - by_rim * across),
+    )

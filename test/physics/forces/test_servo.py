@@ -13,7 +13,6 @@ from rover_physics import SweepOptions, judge_path, judge_poses
 from rover_physics.forces import soil as soil_model
 from rover_physics.forces.servo_balance import write_residual
 from rover_physics.forces.servo_motion import SERVO_STATE
-from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import S, T, roll_wheel
 from rover_physics.numerics.records import new_record
 from rover_physics.prediction.packed_model import pack_model
@@ -217,7 +216,8 @@ def expected(grip, velocity, droop, limit) -> np.ndarray:
 def test_forces_are_those_of_servo_and_friction_law(grip, velocity, droop, limit):
     assume(abs(limit - grip) >= 1e-3 * grip)  # all friction along the wheel: slip is unbounded
     servo = servo_of(limit, droop)
-    roll_wheel(servo, 0, grip, velocity)
+    servo.mu[0], servo.pressing[0], servo.slip[0] = 0.5, 2.0 * grip, np.nan
+    roll_wheel(servo, 0, velocity)
     force = servo.force[0]
     np.testing.assert_allclose(force, expected(grip, velocity, droop, limit), atol=1e-7)
     assert np.hypot(force[T], force[S]) <= grip + 1e-9
@@ -249,8 +249,9 @@ def soil_forces(soil, load, velocity, rim) -> tuple[np.ndarray, float]:
 @given(soils, loads, velocities, droops, st.floats(0.5, 1.0))
 def test_forces_are_those_of_servo_and_soil(soil, load, velocity, droop, share):
     servo = servo_of(10.0, droop, share)
-    servo.soil[0], servo.pressing[0], servo.slip[0] = SOILS[soil], load, np.nan
-    roll_on_soil(servo, 0, velocity)
+    servo.yields[0], servo.soil[0] = 1, SOILS[soil]
+    servo.pressing[0], servo.slip[0] = load, np.nan
+    roll_wheel(servo, 0, velocity)
 
     def excess(rim):
         shear, resistance = soil_forces(soil, load, velocity, rim)
