@@ -138,8 +138,8 @@ def _find_root(tread, velocity, held, gain, target, low, high, rim):
             high = min(high, rim)
         else:
             low = max(low, rim)
-        new = rim - value / slope if slope > 0.0 else low
-        if not low < new < high or abs(new - rim) > 0.5 * change:
+        new = rim - value / slope if slope > 0.0 else np.inf
+        if not low <= new <= high or abs(new - rim) > 0.5 * change:
             new = 0.5 * (low + high)
         change = abs(new - rim)
         thrust += rate * (new - rim)
