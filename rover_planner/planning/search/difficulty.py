@@ -151,22 +151,17 @@ def sample_primitives(
 
     Each is x, y [m] from the first node, and the nearest heading; -1 as heading ends a list.
     """
-    lists = [[_sample(one.poses, one.length, spacing) for one in own] for own in primitives]
-    width = max(len(own) for own in lists)
-    most = 1 + max(len(places) for own in lists for places in own)
-    samples = np.full((HEADINGS, width, most, 3), -1.0)
-    for heading, own in enumerate(lists):
-        for k, places in enumerate(own):
-            samples[heading, k, : len(places)] = places
+    longest = max(one.length for own in primitives for one in own)
+    most = 3 + int(longest / spacing)
+    samples = np.full((HEADINGS, max(map(len, primitives)), most, 3), -1.0)
+    for heading, own in enumerate(primitives):
+        for k, one in enumerate(own):
+            count = 2 + int(one.length / spacing)
+            places = one.poses[np.rint(np.linspace(0, len(one.poses) - 1, count)).astype(int)]
+            turned = np.abs(wrap(places[:, 2:] - YAWS))
+            samples[heading, k, :count, :2] = places[:, :2]
+            samples[heading, k, :count, 2] = np.argmin(turned, axis=1)
     return samples
-
-
-def _sample(poses: NDArray[np.float64], length: float, spacing: float) -> NDArray[np.float64]:
-    """Return places (n, 3), x, y [m] and heading, along the poses of a primitive."""
-    count = 2 + int(length / spacing)
-    places = poses[np.rint(np.linspace(0, len(poses) - 1, count)).astype(int)]
-    turned = np.abs(wrap(places[:, 2:] - YAWS))
-    return np.column_stack([places[:, :2], np.argmin(turned, axis=1)])
 
 
 @exact_kernel

@@ -396,7 +396,8 @@ class ShortestPaths:
         nodes, count = edges.nodes, edges.nodes.count
         self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), np.inf)
         self._tree, self._changed = empty_tree(count), [starts.nodes]
-        self._caution, self._measured, self._since = -1.0, 0, 0
+        self._caution: float | None = None
+        self._measured = self._since = 0
         self.expanded = 0
         """Number of nodes expanded by all searches."""
         self.last_expanded = 0
@@ -418,8 +419,11 @@ class ShortestPaths:
             caution: Weight of the doubts.
         """
         graph = self.graph(caution)
-        if caution != self._caution:
-            self._begin(graph, starts, goals)
+        if self._caution is None and caution > 0.0:
+            self._guess(caution, goals)
+        elif caution != self._caution:
+            self._measure(graph, starts, goals)
+        self._caution = caution
         goal, cost = self._search(graph, starts, goals, max(0, self._measured - self._since))
         if goal == GIVEN_UP:  # the costs to the goal are worn out
             self._measure(graph, starts, goals)
@@ -435,16 +439,8 @@ class ShortestPaths:
         known = edges.state, edges.cost, edges.standing, self._doubt, self._difficulty
         return Graph(edges.least_cost, edges.links, *known, caution, *edges.nodes.shape)
 
-    def _begin(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
-        """Begin with another caution: guess the costs to the goal at first, later measure them."""
-        is_first, self._caution = self._caution < 0.0, graph.caution
-        if is_first and graph.caution > 0.0:
-            self._guess(graph.caution, goals)
-        else:
-            self._measure(graph, starts, goals)
-
     def _guess(self, caution: float, goals: Seeds) -> None:
-        """Take the costs to the goal for those on level ground as the crow flies."""
+        """Take the costs to the goal for those on level ground as the crow flies, at first."""
         nodes = self._edges.nodes
         cell = EAGERNESS * nodes.cell * (1.0 + caution * PRICE * LEAST_DIFFICULTY)
         (row, column), radius = nodes.surround(goals.nodes)
