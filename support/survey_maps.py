@@ -78,20 +78,20 @@ def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -
 _attempts = itertools.count(1)
 
 
-def fail_on_one(job: SurveyJob, chunk: Index) -> int:
+def fail_on_one(job: SurveyJob, chunk: Index) -> int | OSError:
     """Survey a chunk as a task does, but fail on one; here, as workers import it."""
     if chunk == (0, 1):
         raise RuntimeError(f"this chunk is cursed after {next(_attempts)} attempts")
     return survey_chunk(job, chunk)
 
 
-def die_on_one(job: SurveyJob, chunk: Index) -> int:
+def die_on_one(job: SurveyJob, chunk: Index) -> int | OSError:
     """Survey a chunk as a task does, but die of one."""
     if chunk == (0, 1):
         os.kill(os.getpid(), signal.SIGKILL)
     return survey_chunk(job, chunk)
 
 
-def fill_the_disk(job: SurveyJob, chunk: Index) -> int:
+def fill_the_disk(job: SurveyJob, chunk: Index) -> OSError:
     """Find no room for a chunk."""
-    raise OSError(errno.ENOSPC, "No room")
+    return OSError(errno.ENOSPC, "No room")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rover_physics.errors import ModelError
 from rover_physics.numerics.arrays import Floats, SingleFloats, freeze_fields
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.threads import limit_threads
@@ -95,7 +96,8 @@ def sweep_map(
     Args:
         rover: The rover.
         terrain: The map of (ny, nx) cells.
-        headings: Number of headings, the first along x, then equally spaced to the left.
+        headings: Number of headings, at least 1; the first is along x, the others are equally
+            spaced to the left.
         options: As for `judge_path`.
 
     Yields:
@@ -103,8 +105,11 @@ def sweep_map(
         A score takes 25 bytes per pose, and 4 for each limit.
 
     Raises:
-        ModelError, SoilError: As `judge_path`.
+        ModelError: No heading, or as `judge_path`.
+        SoilError: As `judge_path`.
     """
+    if headings < 1:
+        raise ModelError(f"headings is {headings}; it must be a number of headings, at least 1")
     ny, nx = terrain.elevation.shape
     x = terrain.origin[0] + terrain.resolution * np.arange(nx)
     yaw = np.arange(headings) * (2.0 * np.pi / headings)

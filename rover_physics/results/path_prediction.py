@@ -79,8 +79,9 @@ class PathBounds:
 class PathPrediction:
     """Prediction at n waypoints: its attributes are the arrays (n, ...) of QUANTITIES and VIEWS.
 
-    Such as `wheel_loads` (n, 6) [N] or `roll` (n,) [rad]. They are NaN where the rover did not
-    settle, and read-only. Wheels and sides are in the order of `names`.
+    Such as `wheel_loads` (n, 6) [N] or `roll` (n,) [rad]. Where the rover did not settle they are
+    NaN, but for what motion and path alone tell, such as `distance`. They are read-only. Wheels
+    and sides are in the order of `names`.
     """
 
     poses: Floats

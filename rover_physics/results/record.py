@@ -59,7 +59,9 @@ QUANTITIES = (
         "their direction",
     ),
     Quantity(
-        "slip_ratio", (6,), "", "i = 1 - v / (r omega), from the soil model or from the servos"
+        "slip_ratio", (6,), "",
+        "i = 1 - v / (r omega), from the soil model or from the servos; of a wheel that these "
+        "brake on firm ground (r omega) / v - 1",
     ),
     Quantity("torque_saturation", (6,), "", "|torque| / largest torque"),
     Quantity("sinkage", (6,), "m", "sinkage of the wheels in yielding soil"),
@@ -161,7 +163,8 @@ QUANTITIES = (
         "poses that are not settled count as 0", of_path=True,
     ),
 )  # fmt: skip
-"""All quantities of a pose besides its status; NaN where the rover does not settle."""
+"""All quantities of a pose besides its status; NaN where the rover does not settle, but for some
+of motion and path."""
 
 RESULT = record_type(("status", np.int8), *((one.name, float, one.shape) for one in QUANTITIES))
 """Results at one pose: its PoseStatus and the QUANTITIES."""

@@ -73,7 +73,7 @@ class Verdict:
     reasons: tuple[str, ...]
     """For each waypoint the reason why it is not passable, empty if it is."""
     codes: tuple[str, ...]
-    """For each waypoint one of CODES, empty if it is passable."""
+    """For each waypoint one of `codes_of_verdicts`, empty if it is passable."""
     first_failure: int
     """Index of the first waypoint that is not passable, -1 if none."""
     code: str

@@ -99,10 +99,9 @@ class MapTopics(MapIntake):
         """
         settings = self._service.settings
         self.do(partial(self._inputs.keeper.apply, settings.rover, settings.parameters))
+        self.do(self._service.refresh_map)
         if self._is_from_topic and not are_gridded_alike(before, settings.parameters):
             self.repeat()
-        else:
-            self.do(self._service.refresh_map)
 
     def _load_map(
         self, request: LoadMap.Request, response: LoadMap.Response, reply: Reply

@@ -15,7 +15,7 @@ from rover_physics.terrain.ground import BLOCK
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layout import Box, Index
 from rover_planner.survey.request import SurveyRequest
-from rover_planner.survey.store import StoreNotes, SurveyStore
+from rover_planner.survey.store import StoreNotes, SurveyStore, is_refusal
 from rover_planner.survey.tile_survey import BATCH, survey_tile
 
 BYTES_OF_CELL = 60
@@ -36,13 +36,16 @@ class SurveyJob:
     """Version of the model."""
 
 
-def survey_chunk(job: SurveyJob, chunk: Index) -> int:
-    """Survey a chunk and write it into the store; return the number of its poses.
+def survey_chunk(job: SurveyJob, chunk: Index) -> int | OSError:
+    """Survey a chunk and write it into the store.
+
+    Returns:
+        The number of its poses, or why the system refuses to write. It is not raised: Dask would
+        survey the chunk again.
 
     Raises:
         PlanningError: The worker has another version of the model.
-        RoverError, OSError: The map cannot be read, or not computed with, or the chunk cannot be
-            written.
+        RoverError, OSError: The map cannot be read, or not computed with.
     """
     if job.version != rover_physics.__version__:
         raise PlanningError(
@@ -55,7 +58,12 @@ def survey_chunk(job: SurveyJob, chunk: Index) -> int:
     except PlanningError as error:
         error.__cause__ = error.__context__ = None  # GDAL's errors cannot be sent to the client
         raise
-    store.write(chunk, layers, time.perf_counter() - began)
+    try:
+        store.write(chunk, layers, time.perf_counter() - began)
+    except OSError as error:
+        if not is_refusal(error):
+            raise
+        return error
     return layers["worst_class"].size * job.request.headings
 
 

@@ -19,7 +19,7 @@ from rover_planner.survey.dask_cluster import (
     wait_for_workers,
 )
 from rover_planner.survey.layout import Index
-from rover_planner.survey.store import SurveyStore, is_refusal
+from rover_planner.survey.store import SurveyStore
 
 AHEAD = 3
 """Tasks that are submitted at a time, for each thread of the cluster: enough that no worker waits,
@@ -48,7 +48,7 @@ def run_survey(
     chunks: Iterable[Index],
     settings: ClusterSettings,
     on_chunk: Callable[[int], object] = lambda poses: None,
-    task: Callable[[SurveyJob, Index], int] = survey_chunk,
+    task: Callable[[SurveyJob, Index], int | OSError] = survey_chunk,
 ) -> SurveyOutcome:
     """Survey chunks on a cluster.
 
@@ -140,12 +140,12 @@ class _Run:
         error = future.exception()  # waits for the end
         if error is None:
             poses = future.result()
+            if isinstance(poses, OSError):
+                told = f"{self._job.store}: cannot be written: {poses.strerror}; {KEPT}"
+                raise PlanningError(told)
             self._outcome.done += 1
             self._outcome.poses += poses
             self._on_chunk(poses)
-        elif isinstance(error, OSError) and is_refusal(error):
-            told = f"{self._job.store}: cannot be written: {error.strerror}; {KEPT}"
-            raise PlanningError(told)
         elif type(error).__name__ in ("NoWorkerError", "NoValidWorkerError"):
             raise PlanningError(ALONE)
         elif _is_killed(error):

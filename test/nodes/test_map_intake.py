@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps taken as bytes: each is prepared, the last again if need be, bad ones are refused."""
 
+import threading
 from types import SimpleNamespace
 
 from rclpy.serialization import serialize_message
@@ -51,6 +52,17 @@ def test_each_map_is_prepared_and_the_last_again_where_a_parameter_changes():
     intake.wait_for(3)
     intake.close()
     assert len(intake.made) == 3
+
+
+def test_of_maps_that_wait_only_the_latest_is_prepared():
+    intake, go_on = Intake(), threading.Event()
+    intake.do(go_on.wait)
+    for half in (1.0, 2.0, 3.0):
+        intake.offer(cloud_of(half))
+    go_on.set()
+    intake.last_job.result()
+    intake.close()
+    assert [one.bounds[1] for one in intake.made] == [3.0]
 
 
 def test_a_map_that_cannot_be_used_is_refused_and_the_next_is_taken():

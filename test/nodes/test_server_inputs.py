@@ -9,6 +9,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion
 from sensor_msgs.msg import Imu, JointState
 
+from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
@@ -16,8 +17,9 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.server_inputs import LOOK_PERIOD, ServerInputs
-from support.grounds import make_terrain, waves
+from support.grounds import make_terrain, raised, waves
 from support.messages import grid_map_of, odometry_at, transform_message
+from support.rovers import LSR1
 
 PRIOR = make_terrain(waves)
 
@@ -99,3 +101,22 @@ def test_ground_under_a_rover_is_filled_once_where_it_stands_and_again_where_it_
     assert [may_fill(x) for x in (0.0, 0.0, 0.001, 0.0015, 0.003)] == [True, *3 * [False], True]
     inputs.keep(inputs.keeper.load(make_terrain(waves, half=3.0), 0.0, None), "another")
     assert may_fill(0.003) and not may_fill(0.003)
+
+
+def test_a_map_that_is_published_again_stays_as_it_was_filled_under_a_rover_that_trembles():
+    inputs = inputs_with(clock=lambda: 0.0)
+    unseen = raised(PRIOR, np.s_[70:90, 70:90], np.nan)
+
+    def take(height: float, second: int) -> bool:
+        inputs.take_joints(JointState(name=list(SUSPENSION_JOINTS), position=[0.0] * 4))
+        inputs.take_odometry(odometry_at((0.0, 0.0, 0.0), height=height))
+        cloud = terrain_to_point_cloud(unseen, "map", Time(sec=second))
+        return inputs.take_map(cloud, None, "elevation_cloud")
+
+    assert take(0.3, 1)
+    before = inputs.service.terrain
+    assert np.isfinite(before.elevation).sum() > np.isfinite(unseen.elevation).sum()
+    assert not take(0.3001, 2) and inputs.service.terrain is before
+    assert inputs.service.known_map.stamp == 2e9
+    inputs.keeper.apply(LSR1, TraverseServerParameters(fill_under_rover=False))
+    assert take(0.3001, 3) and np.isnan(inputs.service.terrain.elevation).any()

@@ -5,18 +5,16 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.angles import wrap
+from rover_planner.nodes.mission.rover_link import DriveFailedError, RoverLink
+from rover_planner.nodes.mission.server_client import Answer, ServerClient
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
-
-if TYPE_CHECKING:
-    from rover_planner.nodes.mission.rover_link import RoverLink
-    from rover_planner.nodes.mission.server_client import Answer, ServerClient
 
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
@@ -33,10 +31,6 @@ STILL = 0.02
 """Motion below which a rover stands [m]; a turn counts as in `WatchedPath`."""
 SAME_PLACE = 0.1
 """Distance below which two stops are at one place [m]."""
-
-
-class DriveFailedError(Exception):
-    """The rover did not reach the end of its path; the text names the reason."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +72,8 @@ class Drive:
 
     def __init__(
         self,
-        server: "ServerClient",
-        rover: "RoverLink",
+        server: ServerClient,
+        rover: RoverLink,
         goal: Sequence[float],
         settings: DriveSettings,
         report: Callable[[str], object],
@@ -143,7 +137,7 @@ class Drive:
         self._report(f"another plan from {_describe(pose)}")
         return np.array(answer.poses)
 
-    def _ask(self, pose: Poses) -> "Answer":
+    def _ask(self, pose: Poses) -> Answer:
         """Ask for a path to the goal from a pose (3,)."""
         return self._server.ask(pose.tolist(), self._goal)
 

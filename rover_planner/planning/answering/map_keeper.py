@@ -2,7 +2,7 @@
 """Keeps the map of a server: what a loaded map, local maps and the standing rover add to it."""
 
 from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, fingerprint
 from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
 from rover_planner.maps.moved_map import Move, move_map
 from rover_planner.parameters.traverse_server import AUTO, MERGE, TraverseServerParameters
@@ -15,10 +15,12 @@ class MapKeeper:
     def __init__(self, rover: Rover, values: TraverseServerParameters):
         self._rover, self._living = rover, LivingMap(values)
         self._start: GroundBeneath | None = None
+        self._taken = ""
+        """Fingerprint of the local map that is there alone, but for what is filled; or empty."""
 
     def apply(self, rover: Rover, values: TraverseServerParameters) -> None:
         """Use another rover and other parameters from now on; the map stays."""
-        self._rover, self._living.values = rover, values
+        self._rover, self._living.values, self._taken = rover, values, ""
 
     @property
     def merges(self) -> bool:
@@ -34,7 +36,7 @@ class MapKeeper:
             time: Time of the loading [s].
             standing: The rover, if it was measured just now.
         """
-        self._start = None
+        self._start, self._taken = None, ""
         self._living.load(terrain, time)
         return self._filled(standing, time)
 
@@ -50,7 +52,7 @@ class MapKeeper:
     def take(
         self, terrain: Terrain, source: str, time: float, standing: Standing | None
     ) -> MapSnapshot:
-        """Take a local map.
+        """Take a local map; one that is published again keeps what was filled under the rover.
 
         Args:
             terrain: The map.
@@ -62,11 +64,13 @@ class MapKeeper:
             PlanningError: The window would be too large.
             TerrainError: No cell of the window is known.
         """
+        content = "" if self.merges else fingerprint(terrain)
         if self.merges:
             centre = None if standing is None else (standing.x, standing.y)
             self._living.merge(terrain, source, time, centre)
-        else:
+        elif content != self._taken:
             self._living.replace(terrain, source, time)
+        self._taken = content
         return self._filled(standing, time)
 
     def fill(self, standing: Standing, time: float) -> MapSnapshot | None:

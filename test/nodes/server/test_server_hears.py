@@ -3,15 +3,17 @@
 
 import time
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from msg_adapters.identity import path_hash, plan_request_hash
 from rover_physics import load_rover
 from rover_physics.names import WHEEL_JOINTS
 from rover_planner.ros.node import RoverNode
-from support.grounds import make_terrain, wall_at, waves
+from support.grounds import make_terrain, raised, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, begin_plan, verdict_of
 from support.ros_fixtures import call, hear, run_in_executor
 from support.waiting import wait_until
@@ -126,3 +128,12 @@ def test_map_parameters_act_on_the_map_that_is_there(shared):
     wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.1), "the new cells")
     assert client.set_parameter("map_resolution", 0.0)[0]
     wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.05), "the old ones")
+
+
+def test_cells_and_gaps_of_the_map_that_is_there_change_together(start_server, client):
+    server = start_server(max_gap=0.5)
+    client.send_terrain(raised(make_terrain(waves), np.s_[80:82, 80:82], np.nan))
+    changed = {"map_resolution": 0.05, "unknown_cells": "interpolate"}
+    changes = [Parameter(name, value=value) for name, value in changed.items()]
+    assert run_in_executor(server, lambda: server.set_parameters_atomically(changes)).successful
+    wait_until(lambda: np.isfinite(server.service.terrain.elevation).all(), "the gap filled")

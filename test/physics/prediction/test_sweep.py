@@ -20,7 +20,7 @@ from rover_physics import (
     score_poses,
     sweep_map,
 )
-from rover_physics.errors import PoseError, RoverError
+from rover_physics.errors import ModelError, PoseError, RoverError
 from rover_physics.numerics import interruption
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import QUANTITIES
@@ -175,6 +175,12 @@ def test_a_map_is_swept_cell_by_cell(monkeypatch):
     assert status.shape == (31, 41, 3) and tilt.dtype == np.float32
     pose = [-1.0 + 0.1 * 20, 2.0 + 0.1 * 15, 2.0 * np.pi / 3.0]
     np.testing.assert_allclose(tilt[15, 20, 1], score_poses(LSR1, terrain, pose).tilt, rtol=1e-6)
+
+
+@pytest.mark.parametrize("headings", [0, -2])
+def test_a_map_is_swept_at_one_heading_or_more(headings):
+    with pytest.raises(ModelError, match=f"headings is {headings}; it must be"):
+        next(sweep_map(LSR1, LEVEL, headings))
 
 
 def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
