@@ -93,7 +93,9 @@ def _carry_by_momentum(course: _Course) -> None:
     speed = np.where(speed > 0.0, speed, course.swing_radius * np.abs(motion[:, 2]))
     nominal = speed**2 / (2.0 * course.rover.gravity)
     distances = np.append(0.0, course.distances)
-    stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
+    is_waypoint = course.order < len(course.waypoints)
+    repeated = is_waypoint & np.append(False, is_waypoint[:-1])
+    stands = ((distances == 0.0) & ~repeated) | (ahead.max(axis=1) > FACE)
     head, carried, most = 0.0, np.zeros(len(deficits)), RUNAWAY * course.radius
     for k in np.flatnonzero(deficits).tolist():
         if k > 0 and deficits[k - 1] == 0.0:

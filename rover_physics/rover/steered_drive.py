@@ -25,8 +25,9 @@ from rover_physics.rover.model import Rover
 
 ROUNDED_LIMIT = 1e-3
 """Excess of a steering angle over its limit [rad] that counts as rounding, as 1.57 for pi / 2."""
-STILL = 1e-9
-"""Velocity, or a component of it, over the largest that counts as zero."""
+STILL = 1e-4
+"""Velocity, or a component of it, over the largest that counts as zero: poses may be rounded to
+1e-6 m, and a wheel beside or at the centre of a turn then points anywhere."""
 STAND_ERROR = float(np.radians(20.0))
 """Error of a steering angle [rad] above which the rover stands while it steers."""
 

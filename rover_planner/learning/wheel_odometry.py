@@ -35,6 +35,8 @@ of its logarithm."""
 SIDE_SLIDE = 0.25
 """Distance aside over the distance that wheels roll while they slide, on any ground: a face that
 the rover meets askew pushes it aside."""
+JUMP = 2.0
+"""Distance of two poses over the way that the wheels rolled from which a pose has jumped."""
 TRACTION_TIME = 0.5
 """Time over which the traction is averaged [s]: it jumps where wheels hop."""
 
@@ -115,6 +117,7 @@ class WheelOdometry:
         elapsed, self.time = float(row[TIME]) - self.time, float(row[TIME])
         turned, self.yaw_rate = 0.5 * elapsed * (yaw_rate + self.yaw_rate), yaw_rate
         if not 0.0 < elapsed < LONGEST_GAP:
+            self._begin = None  # how far the wheels rolled meanwhile is not known
             return
         # Plain numbers and few sums: arrays of two elements take several times as long.
         pitch = float(row[PITCH])
@@ -199,7 +202,8 @@ class WheelOdometry:
         ahead = float(step @ [np.cos(yaw), np.sin(yaw)])
         left = float(step @ [-np.sin(yaw), np.cos(yaw)])
         distances = np.array([self._rolled, self._pushed, self._leaned]) / self._distance
-        if abs(distances[0]) > 0.9:  # it did not go back and forth
+        jumped = math.hypot(*step) > JUMP * self._distance
+        if abs(distances[0]) > 0.9 and not jumped:  # it did not go back and forth
             self.forward.add(distances[:2], distances[0] - ahead / self._distance)
             self.side.add(distances[2:], -left / self._distance)
 

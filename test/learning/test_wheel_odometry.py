@@ -124,3 +124,17 @@ def test_a_torque_that_cannot_be_believed_does_not_count(value):
         odometry.take(measure(k / RATE, torques=torques), 0.0)
     assert odometry.pose[0] == pytest.approx(way, rel=0.05)
     assert odometry.covariance[0, 0] < (0.1 * way) ** 2
+
+
+@pytest.mark.parametrize("silent", [0.0, 7200.0, -100.0], ids=["jump", "silence", "set back"])
+def test_a_pose_that_jumps_and_a_time_that_was_not_heard_teach_nothing(silent):
+    odometry = WheelOdometry(ROVER)
+    for k in range(200):
+        odometry.take(measure(k / RATE), 0.0)
+        odometry.learn(np.array([SPEED * k / RATE, 0.0, 0.0]))
+    before = odometry.forward.covariance.copy()
+    away = 0.5 if silent else 10.0
+    for k in range(200, 280):
+        odometry.take(measure(k / RATE + silent), 0.0)
+        odometry.learn(np.array([SPEED * k / RATE + away, 0.0, 0.0]))
+    assert (np.diag(odometry.forward.covariance) <= np.diag(before)).all()

@@ -59,6 +59,12 @@ def test_a_stale_transform_is_refused_with_its_age(tree):
         tree.find("map", "base_link", NOW - SECOND, NOW)
 
 
+def test_a_transform_from_before_the_clock_was_set_back_is_not_taken_as_fresh(tree):
+    tree.find("map", "base_link", None, NOW - SECOND)  # dated ahead, as localisation does
+    with pytest.raises(TransformError, match=r"is 980\.0 s in the future; check the clocks"):
+        tree.find("map", "base_link", None, 20 * SECOND)
+
+
 def test_frames_without_a_connection_or_in_a_circle_are_refused(tree):
     with pytest.raises(TransformError, match="no transforms connect the frames 'moon' and 'map'"):
         tree.find("map", "moon", None, NOW)

@@ -16,6 +16,9 @@ from rover_planner.errors import PlanningError
 
 MEMORY = 10_000_000_000
 """Time for which transforms are kept [ns], as in tf2."""
+MOST_AHEAD = 10_000_000_000
+"""Lead of a stamp over the present from which it is of another clock [ns]: localisation dates its
+transforms ahead by about a second."""
 SET_BACK = 1_000_000_000
 """Lead of the last stamp from which the clock was set back [ns]: messages that overtake each other
 differ by less."""
@@ -170,7 +173,7 @@ class TransformTree:
 
         Raises:
             TransformError: A frame is not known, the frames are not connected, a transform is
-                older than the timeout, or not kept for so long.
+                older than the timeout, or not kept for so long; the newest is from the future.
         """
         if target == source:
             return Rigid.none()
@@ -182,6 +185,12 @@ class TransformTree:
             steps = up[: up.index(shared)], down[: down.index(shared)]
             moving = [c for part in steps for c in part if not self._edges[c].is_static]
             newest = min((self._edges[c].stamps[-1] for c in moving), default=now)
+            if time is None and newest - now > MOST_AHEAD:
+                lead = (newest - now) / NANOSECONDS
+                raise TransformError(
+                    f"the newest transform from {source!r} to {target!r} is {lead:.1f} s in the "
+                    "future; check the clocks"
+                )
             at = newest if time is None else time
             for child in moving:
                 self._check(child, at, now)

@@ -11,12 +11,13 @@ import pytest
 from benchmarks.chance import HELD_OUT, find_chance, read_driven_paths
 from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.chance import failure_chance
-from rover_physics.chance.failure_chance import EVEN_SHARE, PLACES, SAMPLES
+from rover_physics.chance.failure_chance import EVEN_SHARE, PLACES, SAMPLES, FailureChance
 from rover_physics.chance.samples import DEVIATES, draw_samples
 from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.uncertainty import Uncertainty
+from rover_physics.traversability.verdict import refuse_chance
 from support.grounds import make_terrain, plane, rocky, with_std
 from support.paths import poses_at
 from support.project.checkout import TOP
@@ -192,6 +193,8 @@ def test_an_accepted_chance_decides():
             judge(wrong)
     plain = judge(None)
     assert plain.traversable and np.isnan(plain.failure_chance) and plain.failure_chance_at == ()
+    lost = refuse_chance(plain, FailureChance(0.5, np.full(5, 0.5), ""), 0.05)
+    assert lost.reason.endswith("most often here, 0.50, where it does not settle")
 
 
 def test_a_path_that_is_refused_as_told_is_asked_for_its_chance_if_wanted():

@@ -51,11 +51,15 @@ def test_a_turn_on_the_spot_that_weak_motors_do_not_brake_has_a_finite_speed(max
     assert np.isfinite(found.speed_share[found.settled]).all()
 
 
-def over_a_hill(speed: float, max_torque: float):
-    """Return prediction and verdict of the way up a hill of 0.1 m at a speed [m/s]."""
+def over_a_hill(speed: float, max_torque: float, repeat: int = 1):
+    """Return prediction and verdict of the way up a hill of 0.1 m at a speed [m/s].
+
+    Each waypoint is told `repeat` times.
+    """
     ground = make_terrain(lambda x, y: 0.05 * np.cos(np.pi * x / 1.5), 0.02, 2.0)
     options = replace(SERVO, friction=0.8, max_torque=max_torque)
-    return judge_path(replace(ROVER, nominal_speed=speed), ground, drive_path()[:130], options)
+    path = np.repeat(drive_path()[:130], repeat, axis=0)
+    return judge_path(replace(ROVER, nominal_speed=speed), ground, path, options)
 
 
 def test_momentum_carries_a_rover_over_a_place_where_little_force_is_missing():
@@ -65,6 +69,7 @@ def test_momentum_carries_a_rover_over_a_place_where_little_force_is_missing():
         low, high = (low, middle) if over_a_hill(0.01, middle)[1].traversable else (middle, high)
     slow, fast = (over_a_hill(speed, 0.997 * low) for speed in (0.01, 0.1))
     assert "stall" in slow[1].reason and fast[1].traversable
+    assert over_a_hill(0.1, 0.997 * low, repeat=2)[1].traversable
     carried = fast[0].results["deficit"] > 0.0
     assert 0.0 < fast[0].speed_share[carried].min() < fast[0].speed_share[~carried].min()
 

@@ -12,7 +12,7 @@ from rover_physics import Rover
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.rover.linkage import pack_linkage
-from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive, steer_wheels
+from rover_physics.rover.steered_drive import STAND_ERROR, STILL, SteeredDrive, steer_wheels
 from rover_physics.rover.steering_joints import (
     can_turn_on_the_spot,
     check_joint_limit,
@@ -49,7 +49,8 @@ def test_every_wheel_rolls_where_the_body_takes_it_as_far_as_it_steers(rover, vx
     assert np.abs(angles).max() <= np.pi / 2
     limit = rover.steering.limit if rover.steering else 0.0
     follows = turns & (np.abs(angles) < limit)  # 1.57 rad is a little less than a right angle
-    assert rolled[follows] == pytest.approx(carried[follows], abs=1e-9)
+    rounded = 1.01 * STILL * np.hypot(*carried.T).max()
+    assert rolled[follows] == pytest.approx(carried[follows], abs=rounded)
     assert not angles[~turns].any()
     assert rolling[~turns] == pytest.approx(carried[~turns, 0], abs=1e-15)
 
@@ -58,6 +59,14 @@ def test_a_limit_that_is_rounded_down_from_a_right_angle_allows_it():
     can_follow, angles, rolling = steer(with_limit(ALL_STEER, 1.57), 0.0, 0.03, 0.0)
     assert can_follow
     assert angles.tolist() == [1.57] * 6 and rolling == pytest.approx([0.03] * 6)
+
+
+@pytest.mark.parametrize("rover", [LSR1, M2020, ALL_STEER], ids=["lsr1", "m2020", "all_steer"])
+def test_wheels_beside_and_at_the_centre_of_a_turn_keep_their_angle_where_poses_are_rounded(rover):
+    for radius in (tightest_radius(rover), rover.suspension.wheels["middle"][1]):
+        motions = [(0.03, 0.0, 0.03 / radius + off) for off in (0.0, 2e-6, -2e-6)]
+        angles = [steer(rover, *motion)[1] for motion in motions]
+        np.testing.assert_allclose(angles[1:], angles[:1] * 2, atol=1e-3)
 
 
 # How tightly a rover turns
