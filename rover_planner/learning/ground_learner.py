@@ -205,7 +205,8 @@ class GroundLearner:
         """Take a row of measurements; return whether the estimate is new."""
         row = self._health.clean(row)
         time, last = float(row[TIME]), self._time
-        if not math.isfinite(time):
+        was_overtaken = -LONGEST_GAP < time - last < 0.0
+        if not math.isfinite(time) or was_overtaken:
             return False
         elapsed, self._time, new = time - last, time, False
         if not 0.0 <= elapsed <= LONGEST_GAP or self._jumps(row):

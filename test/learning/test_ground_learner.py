@@ -185,6 +185,17 @@ def test_a_drive_after_the_clock_was_set_back_is_learned_as_another_one():
     assert learner.estimate.resistance_std > 0.0
 
 
+def test_a_row_that_another_one_has_overtaken_begins_no_other_drive():
+    rows = climb(ROVER, SLOPE, 12.0)
+    late = np.arange(5, len(rows) - 1, 7)
+    order = np.arange(len(rows))
+    order[late], order[late + 1] = late + 1, late
+    kept = np.delete(rows, late, axis=0)
+    found, expected = (learn(one).estimate.friction for one in (rows[order], kept))
+    assert found == expected
+    assert found.low > 0.0
+
+
 def test_nothing_is_learned_from_rows_without_a_pose():
     rows = climb(ROVER, SLOPE, 5.0)
     rows[:, YAW] = np.nan

@@ -97,9 +97,10 @@ def load_joint_map(path: Path) -> UrdfJointMap:
 def map_of(rover: Rover) -> dict[str, Any]:
     """Return the contents of the map that reads a rover back from the URDF of `write_urdf`."""
     contents = rover_to_dict(rover)
-    given = ("gravity", "friction", "nominal_speed", "limits")
+    given = ("gravity", "friction", "nominal_speed", "limits", "uncertainty")
     rest: dict[str, Any] = {key: contents[key] for key in given}
-    rest["wheel"] = {"servo_droop": rover.wheel.servo_droop}
+    drive, wheel = ("servo_droop", "torque_per_current"), contents["wheel"]
+    rest["wheel"] = {key: wheel[key] for key in drive if key in wheel}
     joints: dict[str, Any] = {
         "rocker": {side: f"rocker_{side}" for side in SIDES},
         "bogie": {side: f"bogie_{side}" for side in SIDES},

@@ -17,6 +17,7 @@ from rover_physics.errors import RoverFileError
 from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import preset_names, rover_to_dict, save_rover, save_yaml
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
+from rover_physics.rover.uncertainty import Uncertainty
 from rover_physics.rover.urdf.joint_map import load_joint_map, map_of
 from rover_physics.rover.urdf.read_rover import Levelling, ReadRover, rover_from_urdf
 from rover_physics.rover.urdf.robot import parse_robot
@@ -35,6 +36,15 @@ def test_a_rover_comes_back_from_its_urdf_and_its_file(name, tmp_path):
     assert read.asymmetry < 1e-9 and read.levelling == Levelling()
     save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
     assert load_rover(str(tmp_path / "rover.yaml")) == rover
+
+
+def test_what_a_urdf_does_not_tell_comes_back_by_the_joint_map(tmp_path):
+    preset = load_rover("lsr1")
+    wheel = replace(preset.wheel, servo_droop=0.2, torque_per_current=0.7)
+    rover = replace(preset, wheel=wheel, uncertainty=Uncertainty(mass=0.3))
+    write_urdf(tmp_path / "rover.urdf", rover)
+    save_yaml(tmp_path / "joints.yaml", map_of(rover))
+    assert rover_from_urdf(tmp_path / "rover.urdf", tmp_path / "joints.yaml").rover == rover
 
 
 def foreign_urdf() -> str:
