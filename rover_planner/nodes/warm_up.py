@@ -48,7 +48,7 @@ def search_lattice() -> None:
     nodes = nodes_within(0.2, (1.0, 1.0), (2.0, 2.0))
     edges = Edges(nodes, make_primitives(rover, nodes.cell, 0.1))
     doubt = estimate_ground(rover, ground, nodes).doubt
-    difficulty = estimate_difficulty(rover, ground, nodes, 0.5, edges.samples)
+    difficulty = estimate_difficulty(rover, ground, nodes, 0.5, edges.primitives)
     start, goal = (Seeds(np.array([node]), np.zeros(1)) for node in (0, nodes.count - 1))
     search = ShortestPaths(edges, doubt, difficulty, start)
     for caution in (1.0, 0.0):

@@ -201,9 +201,9 @@ class PathJudgement:
     def ground(self) -> UnobservedShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
         candidate, site = self.candidate, self.site
-        if candidate is None or site is None or site.unobserved_check.seen is None:
+        if candidate is None or site is None or site.seen is None:
             return None
-        return site.unobserved_check.seen.share(site.rover, candidate.poses)
+        return site.seen.share(site.rover, candidate.poses)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

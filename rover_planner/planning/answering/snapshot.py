@@ -28,7 +28,6 @@ from rover_planner.planning.search.lattice_search import SearchProgress
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
 from rover_planner.planning.search.query import SearchQuery
 from rover_planner.planning.search.site import Site
-from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 
@@ -222,8 +221,8 @@ class Snapshot:
         is_stowed = not names or len(known) < len(names)  # until all are known
         options = settings.query.change(joint_angles=None if is_stowed else known)
         rule = settings.parameters.blind_ground
-        check = UnobservedCheck(self.known_map.seen, rule)
-        return Site(settings.rover, self.known_map.terrain, options, check, self.marked)
+        ground, seen = self.known_map.terrain, self.known_map.seen
+        return Site(settings.rover, ground, options, seen, rule, self.marked)
 
     def _describe(
         self, site: Site, candidate: Candidate, search: PathAnswer | None = None

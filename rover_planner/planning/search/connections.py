@@ -2,7 +2,7 @@
 """Connections of the start and the goal, which lie anywhere, to nodes of the lattice."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -123,16 +123,25 @@ class _Connector:
         return poses - (0.0, 0.0, np.pi if gear == Gear.BACKWARD else 0.0)
 
     def turns(self) -> list[Connection]:
-        """Return paths that turn, drive straight and turn, if the rover turns on the spot."""
+        """Return paths that turn, drive straight and turn, if the rover turns on the spot.
+
+        They lead to the nearest nodes that head away from a start, or towards a goal.
+        """
         if not can_turn_on_the_spot(self.rover):
             return []
+        nodes, end, gear = self.nodes, self.end, Gear.ON_THE_SPOT
+        places = nodes.places_near(end, MAX_DISTANCE * nodes.cell)
+        aways = nodes.cell * (places + nodes.first) - end[:2]
+        distances = np.hypot(*aways.T)
         swing, found = swing_radius(self.rover), []
-        for node, there in _turned_nodes(self.nodes, self.end, -1.0 if self.is_goal else 1.0):
-            gear = Gear.ON_THE_SPOT
-            ends = self._order(there, gear)
+        for row in np.argsort(distances, kind="stable")[:TURNED_PLACES]:
+            x, y = -aways[row] if self.is_goal else aways[row]
+            heading = nearest_heading(np.arctan2(y, x) if distances[row] > 1e-6 else end[2])
+            node = nodes.index(places[row : row + 1], np.array([heading]))
+            ends = self._order(nodes.poses(node)[0], gear)
             poses, length = turn_and_drive(*ends, swing, self.waypoint_spacing)
             make = partial(np.asarray, poses)
-            found.append(Connection(node, gear, PRICES[gear] * length, make))
+            found.append(Connection(int(node[0]), gear, PRICES[gear] * length, make))
         return found
 
 
@@ -152,17 +161,6 @@ def _nodes_beside(
     headings = np.tile(turns % HEADINGS, len(places))
     found = nodes.index(np.repeat(places, len(turns), axis=0), headings)
     return found, nodes.poses(found)
-
-
-def _turned_nodes(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
-    """Yield the nearest nodes that head away from a pose (side 1) or towards it (-1)."""
-    places = nodes.places_near(pose, MAX_DISTANCE * nodes.cell)
-    aways = nodes.cell * (places + nodes.first) - pose[:2]
-    for row in np.argsort(np.hypot(*aways.T), kind="stable")[:TURNED_PLACES]:
-        x, y = side * aways[row]
-        heading = nearest_heading(np.arctan2(y, x) if np.hypot(x, y) > 1e-6 else pose[2])
-        node = nodes.index(places[row : row + 1], np.array([heading]))
-        yield int(node[0]), nodes.poses(node)[0]
 
 
 def _about(pose: Floats) -> Floats:

@@ -36,21 +36,19 @@ STEPS_PER_UNIT = 30
 LEAST_DIFFICULTY = 0.5 / STEPS_PER_UNIT
 """Difficulty of level ground."""
 NOT_LOOKED = 255
-"""Difficulty of an edge that was not looked at."""
+"""Difficulty of a place that was not looked at."""
+_AHEAD = np.column_stack([np.cos(YAWS), np.sin(YAWS)])
+"""(HEADINGS, 2) unit vectors along the headings."""
 
 
 class Difficulty(NamedTuple):
     """The estimate for all edges of a window, as kernels read it; found where it is asked for."""
 
-    along_x: np.ndarray
-    """(ny, nx) float32 slope of the ground as wheels feel it, along x, of the steepest cell around
-    each place."""
-    along_y: np.ndarray
-    """(ny, nx) as `along_x`, along y."""
+    slopes: np.ndarray
+    """(2, ny, nx) float32 slopes of the ground as wheels feel it, along x and y, of the steepest
+    cell around each place."""
     shifts: np.ndarray
     """(HEADINGS, 6, 2) int64 places in x and y from the body origin to the wheels."""
-    ahead: np.ndarray
-    """(HEADINGS, 2) unit vectors along the headings."""
     climb: float
     """Slope at which a climb ends [rise over run]."""
     steps: np.ndarray
@@ -65,8 +63,6 @@ class Difficulty(NamedTuple):
     samples: np.ndarray
     """(HEADINGS, P, S, 3) places along the primitives: x, y [m] from the first node, and heading;
     -1 as heading ends a list."""
-    edges: np.ndarray
-    """(nodes, P) uint8 difficulty of the edges in steps; NOT_LOOKED until a search asks for it."""
 
 
 def estimate_difficulty(
@@ -74,7 +70,7 @@ def estimate_difficulty(
     terrain: Terrain,
     nodes: Nodes,
     climb: float,
-    samples: NDArray[np.float64],
+    primitives: tuple[tuple[Primitive, ...], ...],
 ) -> Difficulty:
     """Return the estimate.
 
@@ -83,29 +79,25 @@ def estimate_difficulty(
         terrain: The ground.
         nodes: The nodes.
         climb: Slope at which a climb ends [rise over run].
-        samples: `samples` of Difficulty.
+        primitives: The primitives of each heading.
     """
     blocks = round(SHARE * nodes.cell / terrain.resolution)
     stride = max(1, min(blocks, *terrain.elevation.shape))
-    along_x, along_y = _slopes(
-        _felt_surface(terrain, rover.wheel.radius), terrain.resolution, stride
-    )
+    felt = _felt_surface(terrain, rover.wheel.radius)
+    slopes = _steepest_slopes(felt, terrain.resolution, stride)
     spacing = stride * terrain.resolution
     shifts = np.rint(wheel_places(rover) / spacing).astype(np.int64)
     first = np.asarray(terrain.origin) - nodes.cell * np.array(nodes.first)
     first += 0.5 * (stride - 1) * terrain.resolution
     return Difficulty(
-        along_x,
-        along_y,
+        slopes,
         shifts,
-        np.column_stack([np.cos(YAWS), np.sin(YAWS)]),
         climb,
-        np.full((HEADINGS, *along_x.shape), NOT_LOOKED, np.uint8),
+        np.full((HEADINGS, *slopes.shape[1:]), NOT_LOOKED, np.uint8),
         first,
         spacing,
         nodes.cell,
-        samples,
-        np.full((nodes.count, samples.shape[1]), NOT_LOOKED, np.uint8),
+        sample_primitives(primitives, SAMPLE_SHARE * nodes.cell),
     )
 
 
@@ -139,28 +131,16 @@ def _felt_surface(terrain: Terrain, radius: float) -> NDArray[np.float32]:
     return felt
 
 
-def _slopes(
+def _steepest_slopes(
     heights: NDArray[np.float32], resolution: float, stride: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the slopes along x and y, of blocks of `stride` x `stride` cells the steepest."""
-    along_y, along_x = (
-        np.asarray(np.gradient(heights, resolution, axis=axis), np.float32) for axis in (0, 1)
-    )
-    if stride == 1:
-        return along_x, along_y
-    along_x, along_y = _blocks(along_x, stride), _blocks(along_y, stride)
-    steepest = np.argmax(along_x**2 + along_y**2, axis=2)[..., None]
-    return (
-        np.take_along_axis(along_x, steepest, axis=2)[..., 0],
-        np.take_along_axis(along_y, steepest, axis=2)[..., 0],
-    )
-
-
-def _blocks(values: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
-    """Return the values (ny, nx, stride^2) of each block of a grid; incomplete blocks are left."""
-    ny, nx = (size // stride for size in values.shape)
-    cut = values[: ny * stride, : nx * stride].reshape(ny, stride, nx, stride)
-    return cut.swapaxes(1, 2).reshape(ny, nx, -1)
+) -> NDArray[np.float32]:
+    """Return (2, ny, nx) slopes along x and y, the steepest of each `stride` x `stride` cells."""
+    ny, nx = (size // stride for size in heights.shape)
+    slopes = np.array(np.gradient(heights, resolution)[::-1], np.float32)
+    cut = slopes[:, : ny * stride, : nx * stride].reshape(2, ny, stride, nx, stride)
+    blocks = cut.swapaxes(2, 3).reshape(2, ny, nx, -1)
+    steepest = np.argmax(blocks[0] ** 2 + blocks[1] ** 2, axis=2)
+    return np.take_along_axis(blocks, steepest[None, ..., None], axis=3)[..., 0]
 
 
 @lru_cache(maxsize=8)
@@ -171,22 +151,17 @@ def sample_primitives(
 
     Each is x, y [m] from the first node, and the nearest heading; -1 as heading ends a list.
     """
-    lists = [[_sample(one.poses, one.length, spacing) for one in own] for own in primitives]
-    width = max(len(own) for own in lists)
-    most = 1 + max(len(places) for own in lists for places in own)
-    samples = np.full((HEADINGS, width, most, 3), -1.0)
-    for heading, own in enumerate(lists):
-        for k, places in enumerate(own):
-            samples[heading, k, : len(places)] = places
+    longest = max(one.length for own in primitives for one in own)
+    most = 3 + int(longest / spacing)
+    samples = np.full((HEADINGS, max(map(len, primitives)), most, 3), -1.0)
+    for heading, own in enumerate(primitives):
+        for k, one in enumerate(own):
+            count = 2 + int(one.length / spacing)
+            places = one.poses[np.rint(np.linspace(0, len(one.poses) - 1, count)).astype(int)]
+            turned = np.abs(wrap(places[:, 2:] - YAWS))
+            samples[heading, k, :count, :2] = places[:, :2]
+            samples[heading, k, :count, 2] = np.argmin(turned, axis=1)
     return samples
-
-
-def _sample(poses: NDArray[np.float64], length: float, spacing: float) -> NDArray[np.float64]:
-    """Return places (n, 3), x, y [m] and heading, along the poses of a primitive."""
-    count = 2 + int(length / spacing)
-    places = poses[np.rint(np.linspace(0, len(poses) - 1, count)).astype(int)]
-    turned = np.abs(wrap(places[:, 2:] - YAWS))
-    return np.column_stack([places[:, :2], np.argmin(turned, axis=1)])
 
 
 @exact_kernel
@@ -196,19 +171,11 @@ def difficulty_of(difficulty, columns, node, k):
     It is the largest at the samples of the edge.
 
     Args:
-        difficulty: Difficulty; its `edges` is written.
+        difficulty: Difficulty; its `steps` are written.
         columns: Number of columns of places of the lattice.
         node: The node.
         k: Number of the edge.
     """
-    if difficulty.edges[node, k] == NOT_LOOKED:
-        difficulty.edges[node, k] = _look_along(difficulty, columns, node, k)
-    return (difficulty.edges[node, k] + 0.5) / STEPS_PER_UNIT
-
-
-@exact_kernel
-def _look_along(difficulty, columns, node, k):
-    """Return the difficulty of an edge in steps; arguments as for `difficulty_of`."""
     heading, place = node % HEADINGS, node // HEADINGS
     x = (place % columns) * difficulty.cell - difficulty.first[0]
     y = (place // columns) * difficulty.cell - difficulty.first[1]
@@ -223,19 +190,19 @@ def _look_along(difficulty, columns, node, k):
         if steps[j, i] == NOT_LOOKED:
             steps[j, i] = _look_at(difficulty, int(sample[2]), j, i)
         largest = max(largest, steps[j, i])
-    return largest
+    return (largest + 0.5) / STEPS_PER_UNIT
 
 
 @exact_kernel
 def _look_at(difficulty, heading, j, i):
     """Return the difficulty in steps with the body origin at place j, i, with a heading."""
-    ny, nx = difficulty.along_x.shape
+    _, ny, nx = difficulty.slopes.shape
     steepness, most = 0.0, 0.0
     for wheel in range(6):
         column = min(max(i + difficulty.shifts[heading, wheel, 0], 0), nx - 1)
         row = min(max(j + difficulty.shifts[heading, wheel, 1], 0), ny - 1)
-        x, y = difficulty.along_x[row, column], difficulty.along_y[row, column]
+        x, y = difficulty.slopes[0, row, column], difficulty.slopes[1, row, column]
         steepness += math.sqrt(x * x + y * y)
-        most = max(most, abs(difficulty.ahead[heading, 0] * x + difficulty.ahead[heading, 1] * y))
+        most = max(most, abs(_AHEAD[heading, 0] * x + _AHEAD[heading, 1] * y))
     logit = LEVEL + (ALL_WHEELS * steepness / 6.0 + ONE_WHEEL * most) / difficulty.climb
     return np.uint8(min(STEPS_PER_UNIT * math.log1p(math.exp(min(logit, 8.0))), 254.0))

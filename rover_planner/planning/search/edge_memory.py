@@ -106,7 +106,7 @@ def _is_alike(asked: Site, site: Site) -> bool:
     return (
         asked.rover == site.rover
         and asked.options == site.options
-        and asked.unobserved_check.rule == site.unobserved_check.rule
+        and asked.blind_ground == site.blind_ground
         and asked.marked == site.marked
         and old.resolution == new.resolution
         and old.origin == new.origin
@@ -117,12 +117,12 @@ def _is_alike(asked: Site, site: Site) -> bool:
 
 def _count_changes(asked: Site, site: Site) -> CellCounts:
     """Return the cells in which the maps of two sites that are alike differ, as counts."""
-    before, now = asked.unobserved_check.kinds, site.unobserved_check.kinds
+    before, now = asked.checked_ground, site.checked_ground
     if asked.terrain is site.terrain and before is now:
         return CellCounts(site.terrain, np.zeros(site.terrain.elevation.shape, bool))
     changed = find_changes(asked.terrain, site.terrain)[1:-1, 1:-1]
     if before is not None and now is not None:
-        changed |= before != now
+        changed |= before.kinds != now.kinds
     return CellCounts(site.terrain, changed)
 
 

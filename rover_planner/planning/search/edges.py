@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.angles import wrap
-from rover_planner.planning.search.difficulty import SAMPLE_SHARE, sample_primitives
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, Primitive
 
@@ -66,11 +65,6 @@ class Edges:
         for row, found in zip(links, lists, strict=True):
             row[: len(found)] = found
         return links.reshape(2, HEADINGS, -1, 4)
-
-    @cached_property
-    def samples(self) -> NDArray[np.float64]:
-        """Places along the primitives, see `sample_primitives`."""
-        return sample_primitives(self.primitives, SAMPLE_SHARE * self.nodes.cell)
 
     @property
     def count(self) -> int:

@@ -91,16 +91,11 @@ class SearchTree(NamedTuple):
     """(nodes,) edge that leads to a node; -1 - i for seed i. Written where a cost is finite."""
     is_open: np.ndarray
     """(nodes,) True where a node is reached, but not expanded at that cost."""
-    reached: np.ndarray
-    """(nodes,) the nodes that were reached."""
-    number: np.ndarray
-    """(1,) how many these are."""
 
 
 def empty_tree(count: int) -> SearchTree:
     """Return a tree over so many nodes that has reached none."""
-    cost, parent, reached = np.full(count, np.inf), np.empty(count, int), np.empty(count, int)
-    return SearchTree(cost, parent, np.zeros(count, bool), reached, np.zeros(1, int))
+    return SearchTree(np.full(count, np.inf), np.empty(count, int), np.zeros(count, bool))
 
 
 @exact_kernel
@@ -198,7 +193,12 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
             leave[node] = i
         if tree.cost[node] + exits.costs[i] < best:
             best, found = tree.cost[node] + exits.costs[i], np.int64(i)
-    heap = _list_open(graph, backwards, to_goal, tree)
+    heap = [(0.0, 0.0, np.int64(-1))]
+    heap.clear()
+    for node in np.flatnonzero(tree.is_open):
+        cost = tree.cost[node]
+        heap.append((cost + _bound(graph, node, backwards, to_goal), -cost, node))
+    heapq.heapify(heap)
     for i in range(seeds.nodes.size):
         node, cost = seeds.nodes[i], seeds.costs[i]
         if graph.standing[node] < FAILS and cost < tree.cost[node]:
@@ -232,30 +232,10 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
 
 
 @allocating_kernel
-def _list_open(graph, backwards, to_goal, tree):
-    """Return the heap of the open nodes of a tree; drop nodes that are not reached any more."""
-    heap = [(0.0, 0.0, np.int64(-1))]
-    heap.clear()
-    number, tree.number[0] = tree.number[0], 0
-    for node in tree.reached[:number]:
-        cost = tree.cost[node]
-        if cost < np.inf:
-            tree.reached[tree.number[0]] = node
-            tree.number[0] += 1
-            if tree.is_open[node]:
-                heap.append((cost + _bound(graph, node, backwards, to_goal), -cost, node))
-    heapq.heapify(heap)
-    return heap
-
-
-@allocating_kernel
 def _enter(graph, node, cost, parent, backwards, to_goal, tree, heap):
     """Enter a node at a cost [m], if there may be a path from there."""
     bound = _bound(graph, node, backwards, to_goal)
     if bound < np.inf:
-        if tree.cost[node] == np.inf:
-            tree.reached[tree.number[0]] = node
-            tree.number[0] += 1
         tree.cost[node], tree.parent[node], tree.is_open[node] = cost, parent, True
         heapq.heappush(heap, (cost + bound, -cost, node))
 
@@ -358,17 +338,14 @@ def spread(graph, seeds, backwards, inside, crossing):
             inside[seeds[i]] = True
             stack.append(seeds[i])
     most = graph.links.shape[2]
-    visited = [np.int64(-1)]
-    visited.clear()
     while len(stack) > 0:
         node = stack.pop()
-        visited.append(node)
         for i in range(most):
             other, state = _look_across(graph, node, i, backwards)
             if other >= 0 and state < FAILS and not inside[other]:
                 inside[other] = True
                 stack.append(other)
-    for node in visited:
+    for node in np.flatnonzero(inside):
         for i in range(most):
             other, state = _look_across(graph, node, i, backwards)
             if state >= FAILS and (other < 0 or not inside[other]):
@@ -419,7 +396,8 @@ class ShortestPaths:
         nodes, count = edges.nodes, edges.nodes.count
         self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), np.inf)
         self._tree, self._changed = empty_tree(count), [starts.nodes]
-        self._caution, self._measured, self._since = -1.0, 0, 0
+        self._caution: float | None = None
+        self._measured = self._since = 0
         self.expanded = 0
         """Number of nodes expanded by all searches."""
         self.last_expanded = 0
@@ -441,8 +419,11 @@ class ShortestPaths:
             caution: Weight of the doubts.
         """
         graph = self.graph(caution)
-        if caution != self._caution:
-            self._begin(graph, starts, goals)
+        if self._caution is None and caution > 0.0:
+            self._guess(caution, goals)
+        elif caution != self._caution:
+            self._measure(graph, starts, goals)
+        self._caution = caution
         goal, cost = self._search(graph, starts, goals, max(0, self._measured - self._since))
         if goal == GIVEN_UP:  # the costs to the goal are worn out
             self._measure(graph, starts, goals)
@@ -458,16 +439,8 @@ class ShortestPaths:
         known = edges.state, edges.cost, edges.standing, self._doubt, self._difficulty
         return Graph(edges.least_cost, edges.links, *known, caution, *edges.nodes.shape)
 
-    def _begin(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
-        """Begin with another caution: guess the costs to the goal at first, later measure them."""
-        is_first, self._caution = self._caution < 0.0, graph.caution
-        if is_first and graph.caution > 0.0:
-            self._guess(graph.caution, goals)
-        else:
-            self._measure(graph, starts, goals)
-
     def _guess(self, caution: float, goals: Seeds) -> None:
-        """Take the costs to the goal for those on level ground as the crow flies."""
+        """Take the costs to the goal for those on level ground as the crow flies, at first."""
         nodes = self._edges.nodes
         cell = EAGERNESS * nodes.cell * (1.0 + caution * PRICE * LEAST_DIFFICULTY)
         (row, column), radius = nodes.surround(goals.nodes)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from rover_physics.numerics.kernels import exact_kernel
+from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
@@ -36,22 +36,6 @@ class LatticeGround(NamedTuple):
     """(nodes,) doubt that the rover can be there, 0 or FULL_DOUBT."""
 
 
-class _Question(NamedTuple):
-    """A map, and where the wheels of a rover at a node are, as the kernel reads it."""
-
-    whole: np.ndarray
-    """(ny - 1, nx - 1) whether all corners of a cell are known."""
-    away: np.ndarray
-    """(ny, nx) distance to the next known cell [m]."""
-    resolution: float
-    """Cell size [m]."""
-    offsets: np.ndarray
-    """(HEADINGS, 6, 2) wheel centres at a node at the map frame's origin, from the centre of the
-    map's first cell [m]."""
-    shift: float
-    """Largest distance of a wheel centre from its place on level ground [m], seen from above."""
-
-
 def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> LatticeGround:
     """Estimate all nodes.
 
@@ -60,24 +44,24 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> LatticeGrou
         terrain: The ground.
         nodes: The nodes.
     """
-    wheels = wheel_places(rover)
     known = ~np.isnan(terrain.elevation)
+    whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:]
     away = np.zeros(known.shape) if known.all() else ndimage.distance_transform_edt(~known)
-    question = _Question(
-        known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:],
-        terrain.resolution * away,
-        terrain.resolution,
-        wheels - terrain.origin,
-        largest_wheel_shift(rover),
-    )
-    found = LatticeGround(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
     at = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
-    reach = swing_radius(rover)
+    reach, shift = swing_radius(rover), largest_wheel_shift(rover)
     low, high = np.reshape(terrain.bounds, (2, 2)).T
     doubtful = ((at - reach < low) | (at + reach > high)).any(axis=1)
     doubtful |= CellCounts(terrain, ~known).are_near(at, reach)
-    estimate_nodes(question, at, np.flatnonzero(doubtful), found)
-    return found
+    chosen = np.flatnonzero(doubtful)
+    groundless, unsure = np.zeros((2, HEADINGS, len(at)), bool)
+    for heading, wheels in enumerate(wheel_places(rover) - terrain.origin):
+        x, y = (at[chosen].T[:, None] + wheels.T[..., None]) / terrain.resolution
+        unknown = ~_is_known(whole, x, y)
+        unsure[heading, chosen] = unknown.any(axis=0)
+        unknown[unknown] = _distance(away, x[unknown], y[unknown]) * terrain.resolution > shift
+        groundless[heading, chosen] = unknown.any(axis=0)
+    doubt = np.where(unsure.T.ravel(), np.float32(FULL_DOUBT), np.float32(0.0))
+    return LatticeGround(groundless.T.ravel(), doubt)
 
 
 def wheel_places(rover: Rover) -> NDArray[np.float64]:
@@ -119,41 +103,23 @@ def largest_wheel_shift(rover: Rover) -> float:
     return farthest
 
 
-@exact_kernel
-def estimate_nodes(question, at, chosen, found):
-    """Write the estimates of the nodes at some places.
+def _distance(away: Floats, x: Floats, y: Floats) -> Floats:
+    """Return bounds from below on the distances of places to known ground.
 
-    Args:
-        question: _Question.
-        at: (n, 2) x and y of all places [m].
-        chosen: (k,) the places to look at.
-        found: LatticeGround of zeros, written where it differs.
+    All are in cells, as are the distances `away` of cell corners to the next known one.
     """
-    for place in chosen:
-        for heading in range(HEADINGS):
-            node = place * HEADINGS + heading
-            for wheel in range(6):
-                u = (at[place, 0] + question.offsets[heading, wheel, 0]) / question.resolution
-                v = (at[place, 1] + question.offsets[heading, wheel, 1]) / question.resolution
-                if not _is_known(question.whole, u, v):
-                    found.doubt[node] = FULL_DOUBT
-                    if _distance(question, u, v) > question.shift:
-                        found.groundless[node] = True
-                        break
+    rows, columns = away.shape
+    i = np.clip((x + 0.5).astype(int), 0, columns - 1)
+    j = np.clip((y + 0.5).astype(int), 0, rows - 1)
+    beyond = np.hypot(x - i, y - j)
+    return np.maximum(beyond, away[j, i] - beyond) - 1.0
 
 
-@exact_kernel
-def _distance(question, u, v):
-    """Return a bound from below on the distance from a place [cells] to known ground [m]."""
-    ny, nx = question.away.shape
-    i, j = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
-    beyond = question.resolution * np.hypot(u - i, v - j)
-    return max(beyond, question.away[j, i] - beyond) - question.resolution
-
-
-@exact_kernel
-def _is_known(whole, u, v):
-    """Return whether a place [cells] is on the map, and all corners around it are known."""
-    ny, nx = whole.shape
-    on_map = -_ROUNDING <= u <= nx + _ROUNDING and -_ROUNDING <= v <= ny + _ROUNDING
-    return on_map and whole[min(int(v), ny - 1), min(int(u), nx - 1)]
+def _is_known(whole: NDArray[np.bool_], x: Floats, y: Floats) -> NDArray[np.bool_]:
+    """Return whether places [cells] are on the map, in cells of which `whole` is True."""
+    rows, columns = whole.shape
+    on_map = (x >= -_ROUNDING) & (x <= columns + _ROUNDING)
+    on_map &= (y >= -_ROUNDING) & (y <= rows + _ROUNDING)
+    i = np.clip(x.astype(int), 0, columns - 1)
+    j = np.clip(y.astype(int), 0, rows - 1)
+    return on_map & whole.ravel()[j * columns + i]

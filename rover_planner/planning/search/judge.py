@@ -298,7 +298,7 @@ class PathJudge:
         if code and self._stand_otherwise(pose[None, :], *OTHER_MOTIONS)[0]:
             code, reason = "", ""
         if self._find_unobserved([pose[None, :]], [code]):
-            return UNOBSERVED_CODE, site.unobserved_check.describe()
+            return UNOBSERVED_CODE, site.explain_unseen()
         entered = None if code else site.marked.find(np.stack([start, pose]))
         return (code, reason) if entered is None else (MARKED_CODE, entered[1].describe())
 
@@ -328,9 +328,13 @@ class PathJudge:
         self, pieces: Sequence[NDArray[np.float64]] | NDArray[np.float64], codes: Sequence[str]
     ) -> list[int]:
         """Return the indices of pieces that pass by their codes, but are over unseen ground."""
-        site = self.site
-        passing = [row for row, code in enumerate(codes) if not code]
-        refused = site.unobserved_check.refuses(site.rover, [pieces[row] for row in passing])
+        site, passing = self.site, [row for row, code in enumerate(codes) if not code]
+        if site.checked_ground is None or not passing:
+            return []
+        poses = np.concatenate([pieces[row] for row in passing])
+        below = site.checked_ground.refused_below(site.rover, poses, site.blind_ground)
+        firsts = np.cumsum([0, *(len(pieces[row]) for row in passing[:-1])])
+        refused = np.logical_or.reduceat(below, firsts)
         return [passing[row] for row in np.flatnonzero(refused).tolist()]
 
 

@@ -364,7 +364,7 @@ class _PathFinder:
             connect_end(rover, nodes, self._start, spacing, is_goal=False),
             self._connect_goals(np.flatnonzero(~ground.groundless)),
             ground.doubt,
-            estimate_difficulty(rover, terrain, nodes, climb, edges.samples),
+            estimate_difficulty(rover, terrain, nodes, climb, edges.primitives),
             self.progress,
         )
 

@@ -16,7 +16,7 @@ from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
 from rover_planner.planning.search.site import Site
 
 MAX_NODES = 1_500_000
-"""Largest number of nodes of a window; each takes 80 bytes."""
+"""Largest number of nodes of a window; each takes 90 bytes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from rover_physics import load_rover
-from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty
+from rover_planner.planning.search.difficulty import SAMPLE_SHARE, Difficulty, sample_primitives
 from rover_planner.planning.search.edges import FAILS, PASSES, Edges
 from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
 from rover_planner.planning.search.nodes import nodes_within
@@ -27,10 +27,9 @@ def random_knowledge(seed):
     known.cost[:] = np.where(np.isfinite(least), least, 0.0) * (1.0 + rng.random(least.shape))
     known.standing[rng.random(EDGES.nodes.count) < 0.3] = FAILS
     steps = rng.integers(0, 255, (16, 5, 6), np.uint8)
-    slopes = np.zeros((2, 5, 6), np.float32)
-    level = (*slopes, np.zeros((16, 6, 2), np.int64), np.zeros((16, 2)), 1.0)
-    unseen = np.full(EDGES.state.shape, NOT_LOOKED, np.uint8)
-    hardness = Difficulty(*level, steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples, unseen)
+    level = np.zeros((2, 5, 6), np.float32), np.zeros((16, 6, 2), np.int64), 1.0
+    places = sample_primitives(PRIMITIVES, SAMPLE_SHARE * NODES.cell)
+    hardness = Difficulty(*level, steps, np.zeros(2), 0.5, NODES.cell, places)
     return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness
 
 

@@ -32,7 +32,6 @@ from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.site import Site
-from rover_planner.planning.search.unobserved_check import UnobservedCheck
 from support.grounds import make_terrain, plane
 from support.paths import poses_at
 from support.services import make_service
@@ -140,8 +139,8 @@ def test_goals_near_a_goal_are_over_seen_ground_and_outside_marked_places():
     ground, rover, hole = flat_with_hole(), load_rover("lsr1"), np.array([1.5, 0.0, 0.0])
     seen = observed_ground(ground, None)
     marked = MarkedPlaces((replace(PLACE, x=2.4, radius=0.4),))
-    options, check = PathQueryOptions(accepted_chance=1.0), UnobservedCheck(seen, REFUSE)
-    judge = PathJudge(Site(rover, ground, options, check, marked))
+    options = PathQueryOptions(accepted_chance=1.0)
+    judge = PathJudge(Site(rover, ground, options, seen, REFUSE, marked))
     rings = judge.goals_near(np.array(START), hole, 0.8)
     goals = np.array([goal for ring in rings for goal in ring])
     assert 8 < len(goals) < 32
@@ -157,7 +156,7 @@ def test_a_search_leads_around_ground_never_seen_until_it_is_seen():
 
     def search(seen: ObservedGround, rule=ALLOW_FOOTPRINT, start=START):
         options = PathQueryOptions(waypoint_spacing=0.04)
-        site = Site(rover, ground, options, UnobservedCheck(seen, rule))
+        site = Site(rover, ground, options, seen, rule)
         return find_path(SearchQuery(site, start, GOAL), LatticeSettings(budget=60.0), memory)
 
     around, warm = search(unseen).path.poses, search(filled).path.poses
