@@ -127,7 +127,7 @@ def steer_wheels(linkage, motion, angles, rolling):
         ahead, aside = vx - rate * y, vy + rate * x
         angles[wheel], rolling[wheel] = 0.0, ahead
         if linkage.steers[wheel]:
-            angle, limit = _angle_along(ahead, aside, fastest), linkage.steering_limit
+            angle, limit = _angle_along(ahead, aside, fastest, vx), linkage.steering_limit
             if abs(angle) > limit:
                 if abs(angle) > limit + ROUNDED_LIMIT:
                     can_follow = False
@@ -136,7 +136,7 @@ def steer_wheels(linkage, motion, angles, rolling):
             angles[wheel] = angle
             rolling[wheel] = ahead * np.cos(angle) + aside * np.sin(angle)
         elif vy != 0.0 and linkage.steering_limit > 0.0:
-            angles[wheel] = _angle_along(vx, vy, fastest)
+            angles[wheel] = _angle_along(vx, vy, fastest, vx)
             can_follow = False
     return can_follow
 
@@ -153,11 +153,15 @@ def fastest_wheel(linkage, motion):
 
 
 @kernel
-def _angle_along(ahead, aside, fastest):
-    """Return the angle [rad] of a wheel along a velocity, forwards or backwards; 0 at rest."""
+def _angle_along(ahead, aside, fastest, vx):
+    """Return the angle [rad] of a wheel along a velocity, forwards or backwards; 0 at rest.
+
+    A wheel that goes straight aside in a curve has the angle to which wider curves lead.
+    """
     speed = np.hypot(ahead, aside)
     if not speed > STILL * fastest:
         return 0.0
     if abs(ahead) <= STILL * speed:
-        return 0.5 * np.pi
+        is_mirrored = aside * vx < 0.0 and abs(vx) > STILL * fastest
+        return -0.5 * np.pi if is_mirrored else 0.5 * np.pi
     return np.arctan(aside / ahead)

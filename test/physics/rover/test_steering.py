@@ -69,6 +69,15 @@ def test_wheels_beside_and_at_the_centre_of_a_turn_keep_their_angle_where_poses_
         np.testing.assert_allclose(angles[1:], angles[:1] * 2, atol=1e-3)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+@pytest.mark.parametrize("ahead", [0.03, -0.03], ids=["forward", "backward"])
+def test_wheels_turn_on_in_one_direction_as_a_curve_gets_as_tight_as_it_can(ahead, side):
+    radius = tightest_radius(LSR1)
+    bends = side / (radius * np.array([1.05, 1.0 + 1e-9, 1.0]))
+    wider, *tightest = (steer(LSR1, ahead, 0.0, ahead * bend)[1] for bend in bends)
+    assert np.abs(np.array(tightest) - wider).max() < 0.2
+
+
 # How tightly a rover turns
 
 
