@@ -10,3 +10,7 @@ class PlanningError(RoverError):
 
 class DemoError(Exception):
     """A failure of the demo; the text names the part that failed and the reason."""
+
+
+class DriveFailedError(Exception):
+    """The rover did not reach the end of its path; the text names the reason."""

@@ -21,8 +21,9 @@ from rclpy.exceptions import ParameterException
 
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.errors import DriveFailedError
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
-from rover_planner.nodes.mission.rover_link import DriveFailedError, RoverLink
+from rover_planner.nodes.mission.rover_link import RoverLink
 from rover_planner.nodes.mission.server_client import Answer, NoAnswerError, ServerClient
 from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.ros.process import init_ros

@@ -5,16 +5,19 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.angles import wrap
-from rover_planner.nodes.mission.rover_link import DriveFailedError, RoverLink
-from rover_planner.nodes.mission.server_client import Answer, ServerClient
+from rover_planner.errors import DriveFailedError
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
+
+if TYPE_CHECKING:  # help of programs comes without ROS
+    from rover_planner.nodes.mission.rover_link import RoverLink
+    from rover_planner.nodes.mission.server_client import Answer, ServerClient
 
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
@@ -72,8 +75,8 @@ class Drive:
 
     def __init__(
         self,
-        server: ServerClient,
-        rover: RoverLink,
+        server: "ServerClient",
+        rover: "RoverLink",
         goal: Sequence[float],
         settings: DriveSettings,
         report: Callable[[str], object],
@@ -137,7 +140,7 @@ class Drive:
         self._report(f"another plan from {_describe(pose)}")
         return np.array(answer.poses)
 
-    def _ask(self, pose: Poses) -> Answer:
+    def _ask(self, pose: Poses) -> "Answer":
         """Ask for a path to the goal from a pose (3,)."""
         return self._server.ask(pose.tolist(), self._goal)
 

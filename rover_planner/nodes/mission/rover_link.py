@@ -14,12 +14,9 @@ from msg_adapters.identity import path_hash
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import poses_path
 from rover_physics.numerics.arrays import Floats
+from rover_planner.errors import DriveFailedError
 from rover_planner.nodes.mission.server_client import NoAnswerError, ServerClient
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
-
-
-class DriveFailedError(Exception):
-    """The rover did not reach the end of its path; the text names the reason."""
 
 
 class RoverLink:

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rover_planner.errors import DriveFailedError
 from rover_planner.nodes.mission import drive
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
-from rover_planner.nodes.mission.rover_link import DriveFailedError
 from rover_planner.nodes.mission.server_client import Answer
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_query import PathQueryOptions

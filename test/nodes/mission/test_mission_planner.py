@@ -14,8 +14,8 @@ from rclpy.node import Node
 from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
+from rover_planner.errors import DriveFailedError
 from rover_planner.nodes import mission_planner
-from rover_planner.nodes.mission.rover_link import DriveFailedError
 from rover_planner.nodes.mission.server_client import NoAnswerError
 from rover_planner.nodes.mission_planner import main
 from rover_planner.nodes.programs import MissionOptions, read_arguments
