@@ -53,6 +53,7 @@ def advise(
     from rover_planner.planning.search.site import Site
     from rover_planner.shell.progress import show_progress
 
+    shared.keep_inputs((rover, terrain, poses), out, picture)
     model = load_rover(rover)
     options = PathQueryOptions(
         model=SweepOptions(

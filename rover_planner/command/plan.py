@@ -64,6 +64,7 @@ def plan(
     from rover_planner.planning.search.query_file import write_query
     from rover_planner.planning.search.site import Site
 
+    shared.keep_inputs((rover, terrain), out, dump, picture)
     settings = LatticeSettings(
         budget=budget, cell=cell, frontier=frontier, chance_weight=chance_weight
     )
@@ -90,6 +91,7 @@ def replay_plan(
     """Search the path of a question again that `plan --dump` has written."""
     from rover_planner.planning.search.query_file import read_query
 
+    shared.keep_inputs((question,), out, picture)
     asked, settings = read_query(question, max_cells)
     _ask(asked, settings, out, picture, f"the map of {question.name}")
 
