@@ -38,12 +38,12 @@ from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import (
+    LATCHED_QOS,
+    NEWEST_QOS,
+    POLLED_QOS,
+    RESULT_QOS,
+    TOPIC_QOS,
     joints_qos,
-    latched_qos,
-    newest_qos,
-    polled_qos,
-    result_qos,
-    topic_qos,
 )
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
@@ -83,18 +83,18 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self.heard_until = 0.0
         """Time of the last odometry [s]."""
         self._commanded, self._command_time, self._sent, self._stuck = 0.0, -1e9, -1e9, ""
-        self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
-        self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
-        self._marks = self.create_publisher(String, MARK_PLACE, result_qos())
+        self._estimates = self.create_publisher(String, ESTIMATE, LATCHED_QOS)
+        self._stops = self.create_publisher(Bool, EMERGENCY_STOP, LATCHED_QOS)
+        self._marks = self.create_publisher(String, MARK_PLACE, RESULT_QOS)
         self._wheels = WheelOdometry(self._rover)
         self._wheels_told = -math.inf  # time of the last odometry of the wheels that was sent
-        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", topic_qos())
+        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", TOPIC_QOS)
         hear, rows = self.heard.subscribe, self._rows
-        hear(TwistStamped, "cmd_vel", self._take_command, newest_qos())
+        hear(TwistStamped, "cmd_vel", self._take_command, NEWEST_QOS)
         joints = joints_qos(POLLING)
         hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), joints)
-        hear(Imu, "imu", self._take_imu, polled_qos())
-        hear(Odometry, "odometry", self._take_odometry, polled_qos())
+        hear(Imu, "imu", self._take_imu, POLLED_QOS)
+        hear(Odometry, "odometry", self._take_odometry, POLLED_QOS)
         # By ROS time: where /clock runs fast, more comes in a steady time than queues hold.
         self.loop = self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(self, PointCloud2, CLOUD, self._take_map)

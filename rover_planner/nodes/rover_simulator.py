@@ -39,7 +39,7 @@ from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulato
 from rover_planner.parameters.shared import STOP
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_ground
@@ -104,9 +104,9 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         qos = QoSProfile(depth=5)  # reliable, so that every subscriber hears it
         kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
         self._sensors = [self.create_publisher(kind, name, qos) for name, kind in kinds.items()]
-        self._driven = self.create_publisher(String, "path_driven", latched_qos())
-        self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
+        self._driven = self.create_publisher(String, "path_driven", LATCHED_QOS)
+        self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", TOPIC_QOS)
         self._clock_publisher = None
         if self.get_parameter("use_sim_time").value:
             self._clock_publisher = self.create_publisher(ClockMessage, "/clock", qos)
@@ -117,13 +117,13 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
-        qos, hear, rover = topic_qos(), self.heard.subscribe, self.simulation
+        qos, hear, rover = TOPIC_QOS, self.heard.subscribe, self.simulation
         hear(Bool, STOP, lambda one, arrival: rover.take_stop(one.data, arrival), qos)
         hear(Path, "path", self._take_path, qos)
-        hear(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
+        hear(TwistStamped, "cmd_vel", self._take_speeds, SENSOR_QOS)
         if self.values.follow_commands:
-            hear(Float64MultiArray, COMMANDS, self._take_torques, sensor_qos())
-            hear(Bool, BRAKE, lambda one, _: rover.take_brake(one.data), latched_qos())
+            hear(Float64MultiArray, COMMANDS, self._take_torques, SENSOR_QOS)
+            hear(Bool, BRAKE, lambda one, _: rover.take_brake(one.data), LATCHED_QOS)
 
     def _take_path(self, path: Path, _arrival: float) -> None:
         self.simulation.take_path(path_to_poses(path, self._frame))

@@ -22,7 +22,7 @@ from rover_planner.parameters.traction_controller import TractionControllerParam
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clocks import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
@@ -126,7 +126,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         started, so there are three subscriptions; a stop may arrive three times.
         """
         self.create_service(SetBool, "~/enable", self._enable)
-        for qos in (topic_qos(), latched_qos(), sensor_qos()):
+        for qos in (TOPIC_QOS, LATCHED_QOS, SENSOR_QOS):
             self.heard.subscribe(Bool, "~/emergency_stop", self._take_emergency_stop, qos)
 
     def _apply_settings(self, settings: TractionSettings) -> None:

@@ -16,7 +16,7 @@ from msg_adapters.paths import poses_path
 from rover_physics.numerics.arrays import Floats
 from rover_planner.errors import DriveFailedError
 from rover_planner.nodes.mission.server_client import NoAnswerError, ServerClient
-from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
 
 
 class RoverLink:
@@ -30,8 +30,8 @@ class RoverLink:
         self._paths: Publisher | None = None
         self._own_paths: set[str] = set()
         self._other_path = False
-        node.create_subscription(Odometry, "odometry", self._take_odometry, sensor_qos())
-        driven = node.create_subscription(String, "path_driven", self._take_driven, latched_qos())
+        node.create_subscription(Odometry, "odometry", self._take_odometry, SENSOR_QOS)
+        driven = node.create_subscription(String, "path_driven", self._take_driven, LATCHED_QOS)
         self._driven_topic = driven.topic_name
 
     def send_path(self, poses: Floats) -> None:
@@ -58,8 +58,8 @@ class RoverLink:
             lambda: not node.count_publishers(topic),
             f"the end of {others}, which sends the rover paths",
         )
-        node.create_subscription(Path, "path", self._hear_path, topic_qos())
-        self._paths = node.create_publisher(Path, "path", topic_qos())
+        node.create_subscription(Path, "path", self._hear_path, TOPIC_QOS)
+        self._paths = node.create_publisher(Path, "path", TOPIC_QOS)
         return self._paths
 
     def _hear_path(self, path: Path) -> None:

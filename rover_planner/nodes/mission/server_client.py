@@ -29,7 +29,7 @@ from msg_adapters.results.predictions import array_values
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.answering.budget import STOPPING
-from rover_planner.ros.qos import map_qos, result_qos, service_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, RESULT_QOS, SERVICE_QOS, TOPIC_QOS
 
 REPEAT = 10.0
 """Time after which a question is asked again: the server may have been started anew [s]."""
@@ -80,20 +80,23 @@ class ServerClient(Node):
         self._verdict: dict[str, Any] = {}
         self._verdict_about: tuple[Any, Any] | None = None
         self._arrays: dict[str, np.ndarray] = {}
-        qos = service_qos()
-        self._asker = self.create_client(GetPlan, f"{SERVER}/can_traverse", qos_profile=qos)
-        self._checker = self.create_client(Trigger, f"{SERVER}/check_path", qos_profile=qos)
-        self._adviser = self.create_client(Trigger, f"{SERVER}/advise", qos_profile=qos)
+        self._asker = self.create_client(
+            GetPlan, f"{SERVER}/can_traverse", qos_profile=SERVICE_QOS
+        )
+        self._checker = self.create_client(
+            Trigger, f"{SERVER}/check_path", qos_profile=SERVICE_QOS
+        )
+        self._adviser = self.create_client(Trigger, f"{SERVER}/advise", qos_profile=SERVICE_QOS)
         self._server_parameters = AsyncParameterClient(self, SERVER)
-        self._map_topic = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self._path_topic = self.create_publisher(Path, f"{SERVER}/path", topic_qos())
+        self._map_topic = self.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
+        self._path_topic = self.create_publisher(Path, f"{SERVER}/path", TOPIC_QOS)
         verdicts = self.create_subscription(
-            DiagnosticArray, f"{SERVER}/verdict", self._take_verdict, result_qos()
+            DiagnosticArray, f"{SERVER}/verdict", self._take_verdict, RESULT_QOS
         )
         self._verdicts = verdicts.topic_name  # as remapped, which count_publishers does not do
         for name in ("wheel_loads", "slip_ratios"):
             take = partial(self._take_array, name)
-            self.create_subscription(Float64MultiArray, f"{SERVER}/{name}", take, result_qos())
+            self.create_subscription(Float64MultiArray, f"{SERVER}/{name}", take, RESULT_QOS)
 
     def wait_for_server(self) -> None:
         """Wait until the server's service and its verdict topic are connected."""
