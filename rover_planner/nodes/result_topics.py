@@ -14,7 +14,7 @@ from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.paths import decimate, settled_path
-from msg_adapters.results.diagnostics import verdict_to_diagnostics
+from msg_adapters.results.diagnostics import VERDICT, make_status, texts_of
 from msg_adapters.results.grids import NOT_REACHED, REACHED, occupancy_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import joint_trajectory, tip_over_array, wheel_array
@@ -134,11 +134,12 @@ class ResultMessages:
     def verdict(self) -> DiagnosticArray:
         """Return the verdict and its summary."""
         judgement, report = self.judgement, self.report
-        level = "warning" if report.has_warning else "ok"
-        return verdict_to_diagnostics(
-            level if judgement.traversable else "error", judgement.reason, report.summary(),
-            self.rover.name, self.header,
-        )  # fmt: skip
+        level = "error"
+        if judgement.traversable:
+            level = "warning" if report.has_warning else "ok"
+        reason, entries = judgement.reason or "traversable", texts_of(report.summary())
+        status = make_status(VERDICT, level, reason, entries, self.rover.name)
+        return DiagnosticArray(header=self.header, status=[status])
 
     def closed_area(self) -> OccupancyGrid:
         """Return the area that start or goal are closed in; without places if they are not."""

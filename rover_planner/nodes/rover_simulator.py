@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /rover_simulator: simulates a rover on a terrain with the topics of a real rover."""
 
-import json
 import sys
 import time
 from collections import deque
@@ -26,7 +25,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
 from msg_adapters.joints import JointNames
 from msg_adapters.paths import path_to_poses
-from msg_adapters.results.diagnostics import SIMULATOR, make_status
+from msg_adapters.results.diagnostics import SIMULATOR, make_status, texts_of
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
@@ -207,17 +206,17 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
 
     def _publish_diagnostics(self) -> None:
         state, speeds = self._state, self.simulation.steering
-        said = {
+        values = {
             "position": np.round(state.position, 3).tolist(),
             "wanted_speed": round(speeds[0], 4),
             "wanted_yaw_rate": round(speeds[1], 4),
             "follows_path": self.simulation.follows_path,
         }
-        values = {key: json.dumps(value) for key, value in said.items()}
         level, text = (
             ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
-        status = make_status(SIMULATOR, level, text, values, self.simulation.rover.name)
+        name = self.simulation.rover.name
+        status = make_status(SIMULATOR, level, text, texts_of(values), name)
         header = Header(stamp=self._stamp)
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Header
 from std_srvs.srv import SetBool
 
 from msg_adapters.commands import joint_order
-from msg_adapters.results.diagnostics import traction_diagnostics
+from msg_adapters.results.diagnostics import TORQUES, make_status
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
@@ -26,7 +27,7 @@ from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clocks import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
-from rover_planner.traction.statistics import TractionStatistics
+from rover_planner.traction.statistics import TractionStatistics, judge_update
 from rover_planner.traction.supervisor import TractionSupervisor
 from rover_planner.traction.traction_service import (
     DISABLED,
@@ -253,18 +254,19 @@ class TractionController(RoverNode[TractionControllerParameters]):
         command = self._command
         if command is None:
             return
-        values = self.statistics.describe() | {
+        problems = [*self._inputs.publishers.problems, *filter(None, [command.warning])]
+        values = {
+            "state": command.state,
+            **self.statistics.describe(),
             "watchdog_trips": self._watchdog.trips,
             "internal_errors": self.guard.total,
             "brake": command.brake,
+            "warning": "; ".join(problems),
         }
-        name, stamp = self.service.settings.rover.name, self.get_clock().now().to_msg()
-        self._topics.diagnostics.publish(
-            traction_diagnostics(
-                values, command.state, command.fault,
-                self._inputs.publishers.problems, name, stamp,
-            )
-        )  # fmt: skip
+        level, text = judge_update(command, problems)
+        status = make_status(TORQUES, level, text, values, self.service.settings.rover.name)
+        header = Header(stamp=self.get_clock().now().to_msg())
+        self._topics.diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
