@@ -5,8 +5,8 @@ import json
 import math
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
@@ -178,9 +178,8 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             self._estimates.publish(String(data=json.dumps(contents)))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    return run_node(NODE_NAME, argv, lambda _: GroundLearnerNode())
+main = partial(run_node, NODE_NAME, GroundLearnerNode)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

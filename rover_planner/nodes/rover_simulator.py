@@ -4,7 +4,6 @@
 import sys
 import time
 from collections import deque
-from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
@@ -13,7 +12,6 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState, PointCloud2
@@ -258,14 +256,8 @@ def _transform(state: PlantState, frame_id: str, stamp: Any) -> TransformStamped
     return message
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-
-    def make(options: dict[str, Any]) -> RoverSimulator:
-        overrides = [Parameter(name, value=value) for name, value in options.items()]
-        return RoverSimulator(parameter_overrides=overrides)
-
-    return run_node(NODE_NAME, argv, make, SWITCH_INTERVAL)
+main = partial(run_node, NODE_NAME, RoverSimulator, SWITCH_INTERVAL)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

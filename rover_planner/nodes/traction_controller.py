@@ -3,7 +3,7 @@
 
 import sys
 import time
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -269,9 +269,8 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._topics.diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    return run_node(NODE_NAME, argv, lambda _: TractionController(), SWITCH_INTERVAL)
+main = partial(run_node, NODE_NAME, TractionController, SWITCH_INTERVAL)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

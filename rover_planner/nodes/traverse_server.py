@@ -3,7 +3,7 @@
 
 import sys
 import time
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -339,9 +339,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._diagnostics.publish(DiagnosticArray(header=header, status=statuses))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    return run_node(NODE_NAME, argv, lambda _: TraverseServer(), SWITCH_INTERVAL)
+main = partial(run_node, NODE_NAME, TraverseServer, SWITCH_INTERVAL)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":
