@@ -35,7 +35,7 @@ from std_msgs.msg import Float64MultiArray, String
 
 from benchmarks.processes import START_TIME, STOP_TIMEOUT, NodeProcesses, memory_of, open_nodes
 from benchmarks.stepped_clock import SteppedClock
-from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.sensors import odometry_to_pose
 from rover_physics import save_terrain
 from rover_planner.demo.child_process import ChildProcess
 from rover_planner.ros.qos import SENSOR_QOS, TOPIC_QOS

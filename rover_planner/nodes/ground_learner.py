@@ -17,10 +17,8 @@ from std_msgs.msg import Bool, String
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
-from msg_adapters.imu import ImuMounting
 from msg_adapters.joints import read_joint_map
-from msg_adapters.odometry import planar_odometry
-from msg_adapters.sensing import BASE_FRAME
+from msg_adapters.sensors import BASE_FRAME, ImuMounting, planar_odometry
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS

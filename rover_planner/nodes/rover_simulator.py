@@ -24,7 +24,7 @@ from msg_adapters.identity import path_hash
 from msg_adapters.joints import JointNames
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, make_status, texts_of
-from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
+from msg_adapters.sensors import BASE_FRAME, imu_message, joint_state, odometry_message
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats

@@ -13,7 +13,7 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.sensing import imu_message
+from msg_adapters.sensors import imu_message
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.imu import imu_to_attitude
+from msg_adapters.sensors import imu_to_attitude
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics import save_terrain
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS

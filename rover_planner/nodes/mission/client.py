@@ -26,9 +26,9 @@ from std_srvs.srv import Trigger
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
+from msg_adapters.sensors import odometry_to_pose
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import DriveFailedError, NoAnswerError
