@@ -1,14 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Merges joint states of several publishers: each joint keeps its last value and its time."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.traction.input_monitor import NEVER
 
+MAX_WHEEL_RATE_RATIO = 20.0
+"""Largest possible wheel rate, over the drive's largest; a rover that rolls down a slope is
+faster than its drives."""
+MAX_TURNING_RATE = 20.0
+"""Largest possible rate of the body, a rocker or a bogie [rad/s]."""
+ANGLE_MARGIN = 0.5
+"""Angle beyond the limit of a suspension or steering joint that is possible [rad]."""
 _SUSPENSION, _WHEELS = len(SUSPENSION_JOINTS), len(WHEEL_JOINTS)
 
 
@@ -19,12 +29,24 @@ class JointMemory:
     none is 0.
     """
 
-    def __init__(self, steering: Sequence[str] = ()) -> None:
-        """Start without values; `steering` are the names of the rover's steering joints."""
-        angles = [("position", name) for name in (*SUSPENSION_JOINTS, *steering)]
-        rates = [("velocity", name) for name in (*SUSPENSION_JOINTS, *WHEEL_JOINTS)]
-        self._values = np.zeros(len(angles) + len(rates))
-        self._places = {kind_and_name: place for place, kind_and_name in enumerate(angles + rates)}
+    def __init__(self, rover: Rover) -> None:
+        """Start without values of the joints of a rover."""
+        suspension, fastest = rover.suspension, MAX_WHEEL_RATE_RATIO * rover.wheel.max_speed
+        angles = {
+            name: suspension.rocker_limits if "rocker" in name else suspension.bogie_limits
+            for name in SUSPENSION_JOINTS
+        }
+        if rover.steering is not None:
+            limit = rover.steering.limit
+            angles |= dict.fromkeys(steering_joints(rover), (-limit, limit))
+        rates = dict.fromkeys(SUSPENSION_JOINTS, (-MAX_TURNING_RATE, MAX_TURNING_RATE))
+        rates |= dict.fromkeys(WHEEL_JOINTS, (-fastest, fastest))
+        self._bounds = {
+            ("position", name): (low - ANGLE_MARGIN, high + ANGLE_MARGIN)
+            for name, (low, high) in angles.items()
+        } | {("velocity", name): bounds for name, bounds in rates.items()}
+        self._places = {kind_and_name: place for place, kind_and_name in enumerate(self._bounds)}
+        self._values = np.zeros(len(self._places))
         self._optional = slice(len(angles), len(angles) + _SUSPENSION)
         self.suspension_angles = self._values[:_SUSPENSION]
         """Last angles (4,) of SUSPENSION_JOINTS [rad]; each message writes them anew."""
@@ -33,6 +55,21 @@ class JointMemory:
         self.wheel_rates = self._values[-_WHEELS:]
         """Last rates (6,) of WHEEL_JOINTS [rad/s]; each message writes them anew."""
         self.forget()
+
+    def find_wrong(self, positions: Mapping[str, float], velocities: Mapping[str, float]) -> str:
+        """Describe an angle [rad] or rate [rad/s] that only a broken sensor or driver has."""
+        for kind, unit, values in (
+            ("position", "rad", positions),
+            ("velocity", "rad/s", velocities),
+        ):
+            for name, value in values.items():
+                low, high = self._bounds.get((kind, name), (-math.inf, math.inf))
+                if not low <= value <= high:
+                    return (
+                        f"joint_states has {kind} {value:g} of {name}; it must be in {low:g} to "
+                        f"{high:g} {unit}"
+                    )
+        return ""
 
     def take(
         self,
