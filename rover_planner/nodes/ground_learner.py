@@ -31,7 +31,7 @@ from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.learning.stuck_watch import find_place_ahead
 from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.warm_up import LEARNING
+from rover_planner.nodes.warm_up import LEARNING, load_kernels
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
@@ -45,7 +45,6 @@ from rover_planner.ros.qos import (
 )
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
-from rover_planner.shell.kernels import load_kernels
 
 NODE_NAME = "ground_learner"
 ESTIMATE, EMERGENCY_STOP = "traverse_server/ground_estimate", "traction_controller/emergency_stop"

@@ -31,13 +31,12 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.maps.known_map import describe_terrain
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.warm_up import SIMULATION
+from rover_planner.nodes.warm_up import SIMULATION, load_kernels
 from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulatorParameters
 from rover_planner.parameters.shared import STOP
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
-from rover_planner.shell.kernels import load_kernels
+from rover_planner.shell.extras import find_type
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_ground
 

@@ -18,14 +18,13 @@ from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
-from rover_planner.nodes.warm_up import TRACTION, update_traction
+from rover_planner.nodes.warm_up import TRACTION, load_kernels, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
-from rover_planner.shell.kernels import load_kernels
-from rover_planner.traction.clocks import ClockWatch
+from rover_planner.traction.input_monitor import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.statistics import TractionStatistics, judge_update
 from rover_planner.traction.supervisor import TractionSupervisor

@@ -32,7 +32,7 @@ from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, Path
 from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.nodes.result_topics import ResultMessages, ResultTopics
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
+from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH, load_kernels
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement
@@ -58,7 +58,6 @@ from rover_planner.ros.qos import (
 )
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
 from rover_planner.ros.subscriptions import subscribe_to_requests
-from rover_planner.shell.kernels import load_kernels
 
 NODE_NAME = "traverse_server"
 SWITCH_INTERVAL = 1e-3

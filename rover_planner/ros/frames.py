@@ -21,7 +21,7 @@ from rover_planner.parameters.traction_controller import TractionControllerParam
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.sensor_mounts import read_mounts
 from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
-from rover_planner.ros.optional_types import find_type
+from rover_planner.shell.extras import find_type
 
 TF_DEPTH = 100
 """Messages of /tf that wait to be taken, as in tf2."""

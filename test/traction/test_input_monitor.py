@@ -5,8 +5,7 @@ import pytest
 
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.traction.clocks import ClockWatch
-from rover_planner.traction.input_monitor import NEVER, InputMonitor, StampError
+from rover_planner.traction.input_monitor import NEVER, ClockWatch, InputMonitor, StampError
 from rover_planner.traction.joint_memory import JointMemory
 from support.rovers import FIXED
 
