@@ -22,10 +22,10 @@ from msg_adapters.identity import path_hash
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes import traverse_server
+from rover_planner.nodes import warm_up as kernels
 from rover_planner.nodes.result_topics import RESULTS
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import LATCHED_QOS, RESULT_QOS, TOPIC_QOS
-from rover_planner.shell import kernels
 from support.messages import odometry_at
 from support.ros_fixtures import RosRun, call
 from support.waiting import wait_until
