@@ -169,7 +169,7 @@ class GroundLearner:
         self._sides = {side: FrictionFilter(told) for side in SIDES}
         self._classes: dict[int, FrictionFilter] = {}
         self._stuck = StuckWatch(rover.nominal_speed, wheel.max_torque)
-        self._health = WheelHealth(self._sense.weight, wheel.max_torque)
+        self._health = WheelHealth(rover)
         self._block, self._block_end = np.zeros(1, _SUMS), np.inf
         self._block_duration = find_block_duration(rover)
         self._turned = np.zeros(WHEEL_COUNT)
@@ -216,6 +216,7 @@ class GroundLearner:
             self._slipping[:] = 0
         else:
             self._health.take(row)
+            row = self._health.drop_frozen(row)
         is_full = time >= self._block_end - EARLY * elapsed
         if is_full and (self._block["known"][0, : SUSPENSION.stop] > 0.0).all():
             new = self._think(self._block[0])

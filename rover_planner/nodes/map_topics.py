@@ -201,13 +201,14 @@ class MapCloud:
             self._publisher.withdraw()
         else:
             self._shown = known.fingerprint
-            self._work = self._pool.submit(self._publish, known)
+            publish = partial(self._publish_map, known)
+            self._work = self._pool.submit(self._node.guard.call, publish)
 
     def close(self) -> None:
         """End the thread."""
         self._pool.shutdown(cancel_futures=True)
 
-    def _publish(self, known: KnownMap) -> None:
+    def _publish_map(self, known: KnownMap) -> None:
         more: dict[str, np.ndarray] = {}
         if known.cells is not None:
             age = self._node.seconds - known.cells.time

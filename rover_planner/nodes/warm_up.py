@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from rover_physics.bounds.path import is_uncertain
 from rover_physics.compilation import NICENESS, Compilation, Step
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
-from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_physics.warm_up import EXACT, UNCERTAIN, bound_poses
 from rover_planner.learning.drive_log import FORCES, TIME, WIDTH
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -44,6 +45,13 @@ def search_paths() -> None:
         ground = Terrain(elevation, 0.05, (0.0, 0.0))
         site = Site(load_rover("lsr1"), ground)
         find_path(SearchQuery(site, *ends), LatticeSettings(budget=60.0, cell=0.4))
+
+
+def prepare_search(site: Site) -> None:
+    """Load all kernels that a search at a site needs, so that its budget is not spent on it."""
+    search_paths()
+    if is_uncertain(site.terrain, site.options.map_sigmas):
+        bound_poses()
 
 
 def search_lattice() -> None:

@@ -205,6 +205,7 @@ def test_nothing_is_learned_from_rows_without_a_pose():
     ("sensors", "spoil", "word"),
     [
         (TORQUES, lambda one: np.append(one[:20], 0.0 * one[20:] + one[20]), "torque is frozen"),
+        (TORQUES, lambda one: 0.0 * one - ROVER.wheel.max_torque, "torque is frozen"),
         (TORQUES, lambda one: np.nan * one, "no torque"),
         (TORQUES, lambda one: -one, "torque has the wrong sign"),
         (RATES, lambda one: np.append(one[:20], 0.0 * one[20:]), "rate is frozen"),
@@ -218,6 +219,7 @@ def test_a_bad_sensor_is_told_and_not_believed(sensors, spoil, word):
     assert estimate.faults == {"middle_left": word}
     assert estimate.friction.high is None
     assert estimate.friction.low < 1.2 * SLOPE
+    assert abs(estimate.resistance) < 0.1
 
 
 def test_coarse_rates_whose_last_digit_turns_at_three_wheels_only_are_not_frozen():
@@ -226,6 +228,13 @@ def test_coarse_rates_whose_last_digit_turns_at_three_wheels_only_are_not_frozen
     rates[:, :3] += 0.5 * digit
     rows[:, RATES] = digit * np.round(rates / digit)
     assert not learn(rows).estimate.faults
+
+
+def test_a_motor_that_pushes_as_hard_as_it_can_and_stands_has_no_frozen_torque():
+    rows = climb(ROVER, SLOPE, 8.0, speed=0.0)[::2]
+    rows[:, [TORQUES.start + 2, TORQUES.start + 5]] = ROVER.wheel.max_torque
+    learner = learn(rows)
+    assert learner.stuck and not learner.estimate.faults
 
 
 def test_torques_of_a_rover_that_stands_are_not_frozen_because_others_are_missing():
