@@ -265,10 +265,10 @@ class TractionService:
 
     def find_fault(self, now: float) -> str:
         """Return the fault of the inputs at time `now` [s]; empty if there is none."""
-        if not self.monitor.is_fresh(JOINT_STATES, now) and not self.joints.is_empty:
-            missing = self.joints.describe_older(now - self.monitor.timeouts[JOINT_STATES])
-            self.monitor.describe(JOINT_STATES, missing)
-        return self.monitor.find_fault(now)
+        older = ""
+        if not self.monitor.is_fresh(JOINT_STATES, now):
+            older = self.joints.describe_older(now - self.monitor.timeouts[JOINT_STATES])
+        return self.monitor.find_fault(now, {JOINT_STATES: older})
 
     def start_from(self, torques: Floats) -> None:
         """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
