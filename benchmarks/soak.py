@@ -35,10 +35,10 @@ from std_msgs.msg import Float64MultiArray, String
 
 from benchmarks.processes import START_TIME, STOP_TIMEOUT, NodeProcesses, memory_of, open_nodes
 from benchmarks.stepped_clock import SteppedClock
-from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.sensors import odometry_to_pose
 from rover_physics import save_terrain
 from rover_planner.demo.child_process import ChildProcess
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import SENSOR_QOS, TOPIC_QOS
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.checkout import TOP
 from support.ros_fixtures import RosRun, finish
@@ -80,10 +80,10 @@ class Ear(Node):
         torques = QoSProfile(depth=QUEUE)
         states = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for kind, topic, hear, qos in (
-            (Odometry, "odometry", self._hear_odometry, sensor_qos()),
+            (Odometry, "odometry", self._hear_odometry, SENSOR_QOS),
             (String, "traction_controller/state", self._hear_state, states),
             (Float64MultiArray, "traction_controller/commands", self._hear_torques, torques),
-            (DiagnosticArray, "/diagnostics", self._hear_diagnostics, topic_qos()),
+            (DiagnosticArray, "/diagnostics", self._hear_diagnostics, TOPIC_QOS),
         ):
             self.create_subscription(kind, topic, hear, qos)
 
