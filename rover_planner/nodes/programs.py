@@ -29,8 +29,9 @@ PLACE_IN_SOURCE = re.compile(r",? at /\S+:\d+")
 """Place of an error in the sources of ROS, which helps nobody."""
 
 
-def read_nothing() -> None:
-    """Take no options."""
+def read_nothing() -> dict[str, Any]:
+    """Take no options, which set no parameters."""
+    return {}
 
 
 @dataclass(frozen=True)

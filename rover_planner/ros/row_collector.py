@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import OWN_NAMES, JointNames
-from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.sensors import ImuMounting, imu_to_attitude, odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.learning.drive_log import (

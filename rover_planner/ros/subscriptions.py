@@ -14,9 +14,8 @@ from rclpy.subscription import Subscription
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import (
     HEAR_BEST_EFFORT,
+    make_qos,
     map_subscriptions,
-    replace_reliability,
-    topic_qos,
 )
 
 PERIOD = 5.0
@@ -42,7 +41,7 @@ def subscribe_to_requests(
         reliability: One of `RELIABILITIES`.
         raw: Whether `take` gets the bytes of a message.
     """
-    qos = replace_reliability(topic_qos(), reliability)
+    qos = make_qos(10, reliability)
     _subscribe(node, kind, name, take, qos, HEAR_BEST_EFFORT, raw=raw)
 
 

@@ -12,7 +12,7 @@ from rover_physics.errors import ModelError
 from rover_physics.names import OPTIMAL, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steered_drive import SteeredDrive
-from rover_physics.rover.steering_joints import steered_wheels, steering_joints
+from rover_physics.rover.steering_joints import steered_wheels
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import (
@@ -32,8 +32,7 @@ from rover_physics.traction.solver import (
 from rover_physics.traction.wheel_course import WheelCourse
 from rover_planner.parameters.shared import STOP
 from rover_planner.traction.input_monitor import InputMonitor
-from rover_planner.traction.joint_memory import JointMemory
-from rover_planner.traction.limits import MeasurementLimits
+from rover_planner.traction.joint_memory import MAX_TURNING_RATE, JointMemory
 from rover_planner.traction.loops import (
     HEADING_INTEGRAL_GAIN,
     MAX_PUSH,
@@ -132,7 +131,7 @@ class TractionService:
     def _follow_steering(self, settings: TractionSettings) -> None:
         """Ask for the joints of a rover; all inputs must arrive anew."""
         rover = settings.rover
-        self.joints = JointMemory(steering_joints(rover))
+        self.joints = JointMemory(rover)
         """Last measurements of the joints."""
         self.monitor.forget()
         self._steered, self.course = steered_wheels(rover), WheelCourse(rover)
@@ -151,7 +150,7 @@ class TractionService:
         } | {STOP: parameters.stop_timeout or math.inf}
         self.monitor.tolerance = parameters.stamp_tolerance
         self._writer = BalanceWriter(rover, settings.payload)
-        self._limits, self._drive = MeasurementLimits(rover), SteeredDrive(rover)
+        self._drive = SteeredDrive(rover)
         self._optimal = parameters.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
         self._inputs = ProgramInputs(friction, settings.max_torque, rover.wheel.radius)
@@ -199,7 +198,7 @@ class TractionService:
         A message may hold some of the joints only; each keeps its last value and time. `stamp` is
         the header stamp [ns], 0 if there is none; values whose stamp does not advance are old.
         """
-        wrong = self._limits.find_wrong_joint(positions, velocities)
+        wrong = self.joints.find_wrong(positions, velocities)
         if wrong:
             self.monitor.refuse(JOINT_STATES, wrong, now)
             return
@@ -223,9 +222,9 @@ class TractionService:
 
         `rates` is the angular velocity (3,) in the body frame [rad/s], None if not measured.
         """
-        wrong = self._limits.find_wrong_rates(rates)
-        if wrong:
-            self.monitor.refuse(IMU, wrong, now)
+        if rates is not None and not all(abs(one) <= MAX_TURNING_RATE for one in rates.tolist()):
+            must = f"it must be within {MAX_TURNING_RATE:g} rad/s"
+            self.monitor.refuse(IMU, f"imu has angular velocity {rates.tolist()}; {must}", now)
             return
         self.roll, self.pitch, self._body_rates = roll, pitch, rates
         self.monitor.take(IMU, now)

@@ -13,7 +13,7 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.sensing import imu_message
+from msg_adapters.sensors import imu_message
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
@@ -23,7 +23,7 @@ from rover_planner.learning.drive_log import PITCH, RATES, ROLL, TIME, YAW, X
 from rover_planner.nodes import ground_learner
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
-from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, TOPIC_QOS
 from rover_planner.ros.row_collector import RowCollector
 from support.grounds import plane
 from support.learning_drives import climb
@@ -42,13 +42,13 @@ class Rover(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("rover", context=ros.context)
-        self.map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        self.map = self.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
         kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
-        self.senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
-        self.estimates = hear(self, String, ground_learner.ESTIMATE, latched_qos())
-        self.wheels = hear(self, Odometry, "ground_learner/odometry", topic_qos())
-        self.marks = hear(self, String, ground_learner.MARK_PLACE, latched_qos())
-        self.stops = hear(self, Bool, ground_learner.EMERGENCY_STOP, latched_qos())
+        self.senders = {n: self.create_publisher(k, n, TOPIC_QOS) for n, k in kinds.items()}
+        self.estimates = hear(self, String, ground_learner.ESTIMATE, LATCHED_QOS)
+        self.wheels = hear(self, Odometry, "ground_learner/odometry", TOPIC_QOS)
+        self.marks = hear(self, String, ground_learner.MARK_PLACE, LATCHED_QOS)
+        self.stops = hear(self, Bool, ground_learner.EMERGENCY_STOP, LATCHED_QOS)
 
     @property
     def estimate(self) -> dict:

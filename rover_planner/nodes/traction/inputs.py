@@ -11,8 +11,8 @@ from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
+from msg_adapters.sensors import ImuMounting, imu_to_attitude
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -26,7 +26,7 @@ from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake, are_gridded_alike
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import joints_qos, newest_qos, topic_qos
+from rover_planner.ros.qos import NEWEST_QOS, TOPIC_QOS, joints_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.input_monitor import StampError
 from rover_planner.traction.traction_service import (
@@ -82,12 +82,12 @@ class TractionInputs:
 
     def _subscribe(self) -> None:
         hear = self._node.heard.subscribe
-        joints, newest = joints_qos(LONGEST_PERIOD), newest_qos()
+        joints, newest = joints_qos(LONGEST_PERIOD), NEWEST_QOS
         hear(JointState, JOINT_STATES, self._take_joints, joints, refuse=self._refuse)
         hear(Imu, IMU, self._take_imu, newest, refuse=self._refuse)
         hear(self._twist, CMD_VEL, self._take_command, newest, refuse=self._refuse)
         hear(Odometry, ODOMETRY, self._take_odometry, newest, refuse=self._refuse)
-        hear(Bool, STOP, self._take_stop, topic_qos(), refuse=self._refuse)
+        hear(Bool, STOP, self._take_stop, TOPIC_QOS, refuse=self._refuse)
 
     def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
         types = {
