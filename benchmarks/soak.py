@@ -172,7 +172,7 @@ class Programs:
 
     def kill(self, name: str) -> None:
         """Kill a program."""
-        if self.running[name].running:
+        if self.running[name].poll() is None:
             os.kill(self.running[name].pid, signal.SIGKILL)
 
 
@@ -221,8 +221,8 @@ class Soak:
             time.sleep(0.5)
             loads.append(os.getloadavg()[0])
             mission = self._programs.running[MISSION]
-            if mission.exit_code is not None:
-                how = _ENDS.get(mission.exit_code) or without_numbers(mission.last_line())
+            if mission.poll() is not None:
+                how = _ENDS.get(mission.returncode) or without_numbers(mission.last_line())
                 self._drives[how] += 1
                 self._start_mission()
             if time.monotonic() > due:
@@ -240,7 +240,9 @@ class Soak:
     def measure(self) -> dict[str, object]:
         """Return memory and latency now."""
         running = self._programs.running
-        memory = {name: memory_of(child) for name, child in running.items() if child.running}
+        memory = {
+            name: memory_of(child) for name, child in running.items() if child.poll() is None
+        }
         return {"memory [MB]": memory, "answer [ms]": self._find_latency()}
 
     def _kill(self) -> None:
