@@ -10,7 +10,6 @@ import dataclasses
 import json
 import os
 import random
-import signal
 import socket
 import threading
 from collections.abc import Iterator, Sequence
@@ -229,13 +228,12 @@ def _events(planner: ChildProcess, server: ChildProcess) -> Iterator[dict[str, A
 
     def end_together() -> None:
         server.wait()
-        if planner.running:
-            planner.send_signal(signal.SIGTERM)
+        planner.terminate()
 
     threading.Thread(target=end_together, daemon=True).start()
-    for line in planner.lines():
-        yield json.loads(line)
-    if not server.running:
+    assert planner.stdout is not None
+    yield from map(json.loads, planner.stdout)
+    if server.poll() is not None:
         raise _failure_of(server)
 
 
@@ -255,7 +253,7 @@ def _expect_success(child: ChildProcess) -> None:
 def _failure_of(child: ChildProcess) -> DemoError:
     """Return the error that tells how a child has ended."""
     return DemoError(
-        f"{child.name} ended with code {child.exit_code}: {child.last_line()} (see {child.log})"
+        f"{child.name} ended with code {child.returncode}: {child.last_line()} (see {child.log})"
     )
 
 

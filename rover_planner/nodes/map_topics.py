@@ -30,9 +30,9 @@ from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake, are_gridded_alike
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import ServerInputs
 from rover_planner.ros.subscriptions import subscribe_to_map
+from rover_planner.shell.extras import find_type
 
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""
