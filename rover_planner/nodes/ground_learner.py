@@ -86,10 +86,9 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._wheels = WheelOdometry(self._rover)
         self._wheels_told = -math.inf  # time of the last odometry of the wheels that was sent
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", TOPIC_QOS)
-        hear, rows = self.heard.subscribe, self._rows
+        hear = self.heard.subscribe
         hear(TwistStamped, "cmd_vel", self._take_command, NEWEST_QOS)
-        joints = joints_qos(POLLING)
-        hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), joints)
+        hear(JointState, "joint_states", self._take_joints, joints_qos(POLLING))
         hear(Imu, "imu", self._take_imu, POLLED_QOS)
         hear(Odometry, "odometry", self._take_odometry, POLLED_QOS)
         # By ROS time: where /clock runs fast, more comes in a steady time than queues hold.
@@ -135,12 +134,16 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         )
         self._wheel_odometry.publish(message)
 
+    def _take_joints(self, joints: Any, _arrival: float) -> None:
+        self._rows.take_joints(joints, self.seconds)
+
     def _take_imu(self, imu: Any, _arrival: float) -> None:
         """Take attitude and yaw rate, and go on by what the wheels turned."""
-        self._rows.take_imu(imu)
+        self._rows.take_imu(imu, self.seconds)
         yaw_rate = self._rows.yaw_rate
         if not math.isnan(yaw_rate):
-            self._wheels.take(self._rows.at(self._time_of(imu) / NANOSECONDS), yaw_rate)
+            row = self._rows.at(self._time_of(imu) / NANOSECONDS, self.seconds)
+            self._wheels.take(row, yaw_rate)
 
     def _time_of(self, message: Any) -> int:
         """Return the stamp of a message, or the present time if it has none [ns]."""
@@ -148,7 +151,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
 
     def _take_odometry(self, odometry: Any, _arrival: float) -> None:
         now = self._time_of(odometry) / NANOSECONDS
-        row = self._rows.take_odometry(odometry, now, self.values.map_frame)
+        row = self._rows.take_odometry(odometry, now, self.seconds, self.values.map_frame)
         self.heard_until = now
         self._wheels.learn(row[[X, Y, YAW]])
         learner = self.learner
