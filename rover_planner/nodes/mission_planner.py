@@ -22,7 +22,7 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import DriveFailedError, NoAnswerError, PlanningError
 from rover_planner.nodes.mission.client import NODE_NAME, Answer, MissionPlanner
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
-from rover_planner.nodes.programs import MissionOptions, read_arguments
+from rover_planner.nodes.start import MissionOptions, read_arguments
 from rover_planner.ros.process import init_ros
 from rover_planner.shell.poses import Pose
 from rover_planner.shell.run_program import (
@@ -39,7 +39,7 @@ direction, which is that of the path. Arm and payload are others' work."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node and return its exit code; see `rover_planner.nodes.programs`."""
+    """Run the node and return its exit code; see `rover_planner.nodes.start`."""
     return run_program(NODE_NAME, lambda: _run(argv))
 
 

@@ -20,7 +20,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from rover_physics.errors import RoverError
-from rover_planner.nodes.programs import read_arguments
+from rover_planner.nodes.start import read_arguments
 from rover_planner.ros.guard import GuardedExecutor
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.process import init_ros, take_priority, warn_of_disk

@@ -56,3 +56,8 @@ def find_type(name: str) -> type | None:
     except ImportError:
         return None
     return found
+
+
+def name_type(kind: type) -> str:
+    """Return the name of a type of messages in ROS, such as geometry_msgs/msg/Twist."""
+    return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"

@@ -29,11 +29,10 @@ class InputRecord:
     error: str = ""
     error_time: float = NEVER
     ignored: str = ""
-    detail: str = ""
 
-    def describe(self) -> str:
+    def describe(self, detail: str) -> str:
         """Return why nothing recent was used, in brackets; empty if that is not known."""
-        text = "; ".join(filter(None, (self.detail, self.ignored)))
+        text = "; ".join(filter(None, (detail, self.ignored)))
         return f" ({text})" if text else ""
 
 
@@ -89,7 +88,7 @@ class InputMonitor:
         """Record a valid input that was measured at a time [s]."""
         record = self._inputs[name]
         record.time = max(time, record.time)
-        record.ignored = record.detail = ""
+        record.ignored = ""
         if time >= record.error_time:
             record.error = ""
 
@@ -101,10 +100,6 @@ class InputMonitor:
     def ignore(self, name: str, reason: str) -> None:
         """Record why a message was not used; the reason is shown when the input is stale."""
         self._inputs[name].ignored = reason
-
-    def describe(self, name: str, detail: str) -> None:
-        """Take what is known about a stale input, such as which part of it is missing."""
-        self._inputs[name].detail = detail
 
     def forget(self) -> None:
         """Forget times and stamps of all inputs: each must arrive anew."""
@@ -122,21 +117,24 @@ class InputMonitor:
         needed = self._find_needed()
         return min(record.time + self.timeouts[name] for name, record in needed.items())
 
-    def find_fault(self, now: float) -> str:
+    def find_fault(self, now: float, details: Mapping[str, str] | None = None) -> str:
         """Return the fault of the needed inputs at time `now` [s]; empty if there is none.
 
-        The text of a fault does not change with time.
+        The text of a fault does not change with time. `details` tell what is known about a stale
+        input, by name, such as which part of it is missing.
         """
+        details = details or {}
         needed = self._find_needed()
         missing = {n: one for n, one in needed.items() if one.time == NEVER and not one.error}
         if missing:
-            reasons = "".join(record.describe() for record in missing.values())
+            reasons = "".join(one.describe(details.get(n, "")) for n, one in missing.items())
             return f"waiting for {', '.join(missing)}{reasons}"
         errors = [record.error for record in needed.values() if record.error]
         return "; ".join(
             errors
             or [
-                f"{name} stale: none for {1e3 * self.timeouts[name]:.0f} ms{record.describe()}"
+                f"{name} stale: none for {1e3 * self.timeouts[name]:.0f} ms"
+                f"{record.describe(details.get(name, ''))}"
                 for name, record in needed.items()
                 if not self.is_fresh(name, now)
             ]

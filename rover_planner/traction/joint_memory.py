@@ -112,11 +112,6 @@ class JointMemory:
         """Time of the oldest wheel rate [s]; NEVER if one is missing."""
         return min(self._times[-_WHEELS:])
 
-    @property
-    def is_empty(self) -> bool:
-        """True if no joint has a value."""
-        return max(self._times) == NEVER
-
     def find_suspension_rates(self, earliest: float) -> Floats | None:
         """Return the rates (4,) of SUSPENSION_JOINTS [rad/s]; None if one is older [s]."""
         is_old = min(self._times[self._optional]) < earliest

@@ -90,46 +90,11 @@ class TractionService:
         self._workspace = TractionWorkspace()
         self.monitor = InputMonitor({}, optional=(ODOMETRY,))
         """Times and errors of the inputs; odometry is never a fault."""
-        self._follow_steering(settings)
-        self._suspension_rates: Floats | None = None
-        self.roll, self.pitch = 0.0, 0.0
-        """Last measured attitude [rad], pitch positive with the nose down."""
-        self._body_rates: Floats | None = None
-        self.wanted = (0.0, 0.0)
-        """Commanded speed [m/s] and yaw rate [rad/s], within what the rover can do."""
-        self._pose, self._deviation = np.zeros(4), 0.0
-        self._body_speed = BodySpeed()
         self._finder: MapContactFinder | None = None
-        self._last_time: float | None = None
-        self._last: TractionAnswer | None = None
-        self._apply(settings)
-        self._estimator = MotionContactEstimator(settings.rover)
-        self._create_loops()
-        self._reset()
+        self._begin(settings)
 
-    @property
-    def settings(self) -> TractionSettings:
-        """The current settings; new ones keep the torques and what the loops have added up."""
-        return self._settings
-
-    @settings.setter
-    def settings(self, settings: TractionSettings) -> None:
-        last = self._settings
-        self._apply(settings)
-        integrals = self._speed.integral, self._heading.integral
-        self._create_loops()
-        if settings.rover is last.rover:
-            self._speed.start(integrals[0])
-            self._heading.start(integrals[1])
-            return
-        self._estimator = MotionContactEstimator(settings.rover)
-        self._follow_steering(settings)
-        self._last = None
-        if self._finder is not None:
-            self.take_map(self._finder)
-
-    def _follow_steering(self, settings: TractionSettings) -> None:
-        """Ask for the joints of a rover; all inputs must arrive anew."""
+    def _begin(self, settings: TractionSettings) -> None:
+        """Start with a rover, of which nothing is measured yet."""
         rover = settings.rover
         self.joints = JointMemory(rover)
         """Last measurements of the joints."""
@@ -138,9 +103,40 @@ class TractionService:
         """Which wheels steer, and what is asked of them."""
         self.steering = np.zeros(WHEEL_COUNT)
         """Last measured steering angles (6,) [rad], positive to the left."""
+        self._suspension_rates: Floats | None = None
+        self.roll, self.pitch = 0.0, 0.0
+        """Last measured attitude [rad], pitch positive with the nose down."""
+        self._body_rates: Floats | None = None
+        self.wanted = (0.0, 0.0)
+        """Commanded speed [m/s] and yaw rate [rad/s], within what the rover can do."""
+        self._pose, self._deviation = np.zeros(4), 0.0
+        self._body_speed = BodySpeed()
+        self._estimator = MotionContactEstimator(rover)
+        self._apply(settings)
+        self._reset()
+
+    @property
+    def settings(self) -> TractionSettings:
+        """The current settings; new ones keep the torques and what the loops have added up.
+
+        After another rover all inputs must arrive anew.
+        """
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: TractionSettings) -> None:
+        if settings.rover is self._settings.rover:
+            speed, heading = self._speed.integral, self._heading.integral
+            self._apply(settings)
+            self._speed.start(speed)
+            self._heading.start(heading)
+            return
+        self._begin(settings)
+        if self._finder is not None:
+            self.take_map(self._finder)
 
     def _apply(self, settings: TractionSettings) -> None:
-        """Take what follows from settings and has no state."""
+        """Take what follows from settings, and create the loops with their gains."""
         self._settings = settings
         rover, parameters = settings.rover, settings.parameters
         self._radius = rover.wheel.radius
@@ -149,22 +145,28 @@ class TractionService:
             for name in (JOINT_STATES, IMU, CMD_VEL, ODOMETRY)
         } | {STOP: parameters.stop_timeout or math.inf}
         self.monitor.tolerance = parameters.stamp_tolerance
-        self._writer = BalanceWriter(rover, settings.payload)
-        self._drive = SteeredDrive(rover)
+        self._writer, self._drive = BalanceWriter(rover, settings.payload), SteeredDrive(rover)
         self._optimal = parameters.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
         self._inputs = ProgramInputs(friction, settings.max_torque, rover.wheel.radius)
-
-    def _create_loops(self) -> None:
-        """Create the loops of speed and heading with the current gains."""
-        rover, gains = self._settings.rover, self._settings.parameters
-        weight = self._writer.weight
-        mass, max_push = weight / rover.gravity, MAX_PUSH * weight
-        self._speed = PushLoop(mass * gains.speed_gain, mass * gains.travel_gain, max_push)
+        mass, max_push = self.weight / rover.gravity, MAX_PUSH * self.weight
+        self._speed = PushLoop(
+            mass * parameters.speed_gain, mass * parameters.travel_gain, max_push
+        )
         half_track = rover.suspension.wheels["middle"][1]
-        gain = half_track**2 * (mass * gains.heading_gain)
+        gain = half_track**2 * (mass * parameters.heading_gain)
         self._heading = PIController(gain, HEADING_INTEGRAL_GAIN * gain, max_push * half_track)
-        self._slip = SlipControl(self._settings.slip_gain, self._settings.max_torque)
+        self._slip = SlipControl(settings.slip_gain, settings.max_torque)
+
+    def _reset(self) -> None:
+        """Discard the last answer and set all integrals to zero."""
+        self._speed.start()
+        self._heading.start()
+        self._slip.detector = StallDetector()
+        self._last_time: float | None = None
+        self._last: TractionAnswer | None = None
+        self._limited, self._peak = False, 0.0
+        self._torques = np.zeros(WHEEL_COUNT)
 
     @property
     def weight(self) -> float:
@@ -265,10 +267,10 @@ class TractionService:
 
     def find_fault(self, now: float) -> str:
         """Return the fault of the inputs at time `now` [s]; empty if there is none."""
-        if not self.monitor.is_fresh(JOINT_STATES, now) and not self.joints.is_empty:
-            missing = self.joints.describe_older(now - self.monitor.timeouts[JOINT_STATES])
-            self.monitor.describe(JOINT_STATES, missing)
-        return self.monitor.find_fault(now)
+        older = ""
+        if not self.monitor.is_fresh(JOINT_STATES, now):
+            older = self.joints.describe_older(now - self.monitor.timeouts[JOINT_STATES])
+        return self.monitor.find_fault(now, {JOINT_STATES: older})
 
     def start_from(self, torques: Floats) -> None:
         """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
@@ -306,16 +308,6 @@ class TractionService:
         """Return zero torques at once, and reset the loops."""
         self._reset()
         return TractionCommand(np.zeros(WHEEL_COUNT), fault, state=FAULT)
-
-    def _reset(self) -> None:
-        """Discard the last answer and set all integrals to zero."""
-        self._speed.start()
-        self._heading.start()
-        self._slip.detector = StallDetector()
-        self._last_time = None
-        self._last = None
-        self._limited, self._peak = False, 0.0
-        self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
         """Return the contact angles of the best source, and a warning, empty if none."""

@@ -14,7 +14,7 @@ import yaml
 from rclpy.node import Node
 
 from rover_planner.nodes import start
-from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.start import PROGRAMS
 from rover_planner.shell.extras import PLAIN
 from support.project.checkout import TOP, setup_arguments
 from support.ros_fixtures import domain_id
@@ -30,7 +30,7 @@ RUN_ALL = """
 import contextlib, io, json, sys
 sys.modules["rclpy"] = None
 from rover_planner.nodes import start
-from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.start import PROGRAMS
 ended = {}
 for name in PROGRAMS:
     sys.argv, out, err = [name, "--help"], io.StringIO(), io.StringIO()

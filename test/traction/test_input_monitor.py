@@ -41,7 +41,7 @@ def test_why_messages_were_not_used_is_told_with_the_fault():
 
 def test_wheels_and_suspension_may_come_in_messages_of_their_own_and_an_arm_changes_nothing():
     memory = JointMemory(FIXED)
-    assert memory.is_empty and memory.time == NEVER
+    assert memory.time == NEVER
     assert memory.take(ANGLES, {}, 1.0)
     assert memory.describe_older(0.5) == f"no velocity of {', '.join(WHEEL_JOINTS)}"
     assert memory.take({}, RATES, 1.1)

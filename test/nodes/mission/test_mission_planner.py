@@ -17,7 +17,7 @@ from rover_planner.advice.levers import LEVERS
 from rover_planner.errors import DriveFailedError, NoAnswerError
 from rover_planner.nodes import mission_planner
 from rover_planner.nodes.mission_planner import main
-from rover_planner.nodes.programs import MissionOptions, read_arguments
+from rover_planner.nodes.start import MissionOptions, read_arguments
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, rock_left, wall_at, waves
