@@ -102,14 +102,19 @@ def look_into_cell(search, corner, heading, shape):
     (s0, t0), (ex, ey), (a, b, c, d) = corner, heading, shape
     R, cosine, half = search.radius, search.cosine, 0.5 / (d * ex * ey)
     slope_t, skew, gain = c * ex - b * ey, d * (ex * ex - ey * ey), d * d * half * cosine
-    rise = (b * ex + c * ey + slope_t * skew * half) * cosine - gain * s0
+    level, rate = a + 0.5 * slope_t * slope_t * half, b * ex + c * ey + slope_t * skew * half
+    rise = rate * cosine - gain * s0
     low, high = s0 + min(ex, 0.0) + min(ey, 0.0), s0 + max(ex, 0.0) + max(ey, 0.0)
     low, high = max(low, -FIRST * R), min(high, FIRST * R)
     starts = 0.5 * (low + high), np.nan
     if gain * R > 1.0:  # The wheel bends less than the ground: peaks are on its steep sides.
         starts = low, high
-    elif not _rate_at(R, rise, gain, low) > 0.0 > _rate_at(R, rise, gain, high):
-        return
+    else:  # It bends at least as at its bottom.
+        at = min(max(rise / (1.0 / R - gain), low), high)
+        along = at - s0
+        most = (level + rate * along) * cosine + 0.5 * gain * along * along + R - 0.5 * at * at / R
+        if most <= search.best * cosine:
+            return
     for start in starts:
         if not abs(start) < R:
             break
@@ -127,12 +132,6 @@ def look_into_cell(search, corner, heading, shape):
         u, v = ex * (s - s0) - ey * aside, ey * (s - s0) + ex * aside
         if min(u, v) >= 0.0 and max(u, v) <= 1.0 and is_below(search, s, t0 + aside):
             take_point(search, s, t0 + aside, a + b * u + c * v + d * u * v)
-
-
-@kernel
-def _rate_at(R, rise, gain, s):
-    """Return the change of the intrusion along the line of best t, times the camber's cosine."""
-    return rise + gain * s - s / np.sqrt(R * R - s * s)
 
 
 @kernel

@@ -12,7 +12,7 @@ import numpy as np
 
 from rover_physics.contact.cell_search import look_everywhere
 from rover_physics.contact.contact_record import SearchScope, write_point
-from rover_physics.contact.rim_scan import find_gap, find_tops, scan_rims
+from rover_physics.contact.rim_scan import find_tops, scan_carefully, scan_rims
 from rover_physics.contact.tracking import (
     follow_contact,
     keep_contact,
@@ -21,6 +21,7 @@ from rover_physics.contact.tracking import (
 )
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import PoseStatus
+from rover_physics.terrain.ground import height_inside, to_cells
 
 COMPLIANCE = 2e-3
 """Deformation of real wheels and ground [wheel radii]. Circles whose gaps differ by less share the
@@ -62,18 +63,19 @@ def find_contact(model, work, wheel, scope):
     elif scope == SearchScope.QUICK:
         contacts.kept[wheel] = 0
     if lost or (scope != SearchScope.NEAR and scope != SearchScope.FULL):
-        status, nearest = scan_rims(model, work, wheel)
+        status, nearest = scan_rims(model, work, wheel, scope)
         if nearest[0] == np.inf:
             contacts.gap[wheel] = np.nan
             return status
         _take_sample(model.samples, contacts, wheel, nearest)
-        follow_contact(model, work, wheel)
+        if scope != SearchScope.COARSE:
+            follow_contact(model, work, wheel)
     if scope == SearchScope.NEAR:
         look_at_kept(model, work, wheel)
     if scope == SearchScope.FULL or scope == SearchScope.WHOLE:
         rear, front = find_tops(model, work, wheel)
         if scope == SearchScope.FULL and not (rear < np.inf and front < np.inf):
-            status = scan_rims(model, work, wheel)[0]
+            status = scan_carefully(model, work, wheel, scope)[0]
         below = look_everywhere(model, work, wheel, (rear, front))
         if status == PoseStatus.SETTLED:
             status = below
@@ -83,18 +85,36 @@ def find_contact(model, work, wheel, scope):
 
 @kernel
 def _guess(model, work, wheel):
-    """Write the nearest of every other sample of the middle circle; False if none is known."""
-    samples, contacts = model.samples, work.contacts
-    nearest, row = np.inf, 0
+    """Write the nearest of every other sample of the middle circle; False near unknown ground."""
+    ground, samples, placement = model.ground, model.samples, work.placement
+    forward, up, centres = placement.forward[wheel], placement.up[wheel], placement.centres
+    scale, radius = ground.inverse_resolution, samples.radius
+    gx, gy = to_cells(ground, centres[wheel, 0], centres[wheel, 1])
+    size = radius * scale
+    if not (
+        gx >= size
+        and gy >= size
+        and gx < ground.columns - 1 - size
+        and gy < ground.rows - 1 - size
+    ):
+        return False
+    ahead_x, ahead_y = size * forward[0], size * forward[1]
+    down_x, down_y, down_z = size * up[0], size * up[1], radius * up[2]
+    nearest, row, total = np.inf, 0, 0.0
     for k in range(samples.rows // 2 % 2, samples.rows, 2):
-        turn = samples.sines[k], samples.cosines[k]
-        gap = find_gap(model, work, (wheel, 0.0), turn)[0]
-        if gap < nearest:
-            nearest, row = gap, k
-    contacts.gap[wheel], contacts.across[wheel], contacts.inside[wheel] = nearest, 0.0, 0
-    turn = samples.sines[row], samples.cosines[row]
-    write_point(samples.radius, work, wheel, turn, 0.0)
-    return nearest < np.inf
+        s, c = samples.sines[k], samples.cosines[k]
+        dx, dy = s * ahead_x - c * down_x, s * ahead_y - c * down_y
+        height = height_inside(ground, gx + dx, gy + dy)
+        gap = -c * down_z - height
+        total += height
+        row = k if gap < nearest else row
+        nearest = min(nearest, gap)
+    if total != total:
+        return False
+    work.contacts.gap[wheel] = centres[wheel, 2] + nearest
+    work.contacts.across[wheel], work.contacts.inside[wheel] = 0.0, 0
+    write_point(samples.radius, work, wheel, (samples.sines[row], samples.cosines[row]), 0.0)
+    return True
 
 
 @kernel

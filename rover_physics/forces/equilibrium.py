@@ -36,7 +36,6 @@ BALANCE = record_type(
     ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
     ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
     ("units", float, (6, 3, UNKNOWNS)),  # terms of unit forces N, T, S of each wheel
-    ("terms", float, (UNKNOWNS,)),  # work space: terms of a weight in the equations
     ("shares", SHARES),  # shares of the wheels in the common forces
 )
 """Forces of a settled rover as linear functions of its free forces, over the rover's weight.
@@ -120,7 +119,7 @@ def write_equations(linkage, placement, contacts, columns, balance):
             if k > FREE_TORQUES:
                 wheel, kind = free[k - 1 - FREE_TORQUES], 2
             B[row, k] = -units[wheel, kind, row]
-    _add_weights(linkage, placement, balance)
+    _add_weights(linkage, placement, B)
     if linkage.has_tool_load:
         add_body_load(linkage, placement, linkage.tool, B)
 
@@ -128,44 +127,34 @@ def write_equations(linkage, placement, contacts, columns, balance):
 @kernel
 def _write_units(linkage, placement, contacts, balance, wheel):
     """Write the terms of the unit forces N, T and S of a wheel in the nine equations."""
-    carrier = BOGIE if linkage.on_bogie[wheel] else ROCKER
+    R, length, side = placement.R, linkage.length, wheel // 3
+    x, y, z = difference(contacts.point[wheel], placement.origin)
+    arm = x / length, y / length, z / length
     for kind in range(3):
-        frame = balance.frames[wheel, kind]
+        unit, frame = balance.units[wheel, kind], balance.frames[wheel, kind]
         force = frame[0], frame[1], frame[2]
-        part = contacts.point[wheel], wheel // 3, carrier
-        _write_terms(linkage, placement, part, force, balance.units[wheel, kind])
+        moment = cross(arm, force)
+        about_axis = dot(moment, (R[0, 1], R[1, 1], R[2, 1]))
+        unit[0], unit[1], unit[2] = force
+        unit[3], unit[4], unit[5] = moment
+        unit[6] = unit[7] = 0.0
+        if linkage.on_bogie[wheel]:
+            about = _moment_about(linkage, placement, placement.bogie_pivots[side], force)
+            unit[6 + side] = about_axis - about
+        about = _moment_about(linkage, placement, placement.rocker_pivots[side], force)
+        unit[8] = rocker_sign(side) * (about_axis - about)
 
 
 @kernel
-def _write_terms(linkage, placement, part, force, terms):
-    """Write the terms (9,) of a force (x, y, z) on a part in the nine equations.
-
-    The part is (point at which the force acts [m], side, link that carries the part).
-    """
-    R, (point, side, carrier) = placement.R, part
-    moment = _moment_about(linkage, placement.origin, point, force)
-    terms[0], terms[1], terms[2] = force
-    terms[3], terms[4], terms[5] = moment
-    terms[6] = terms[7] = terms[8] = 0.0
-    axis = R[0, 1], R[1, 1], R[2, 1]
-    if carrier == BOGIE:
-        pivot = placement.bogie_pivots[side]
-        terms[6 + side] = dot(axis, _moment_about(linkage, pivot, point, force))
-    if carrier != BODY:
-        pivot = placement.rocker_pivots[side]
-        about = dot(axis, _moment_about(linkage, pivot, point, force))
-        terms[8] = rocker_sign(side) * about
+def _moment_about(linkage, placement, pivot, force):
+    """Return the moment about the origin along the wheel axes of a force (x, y, z) at a pivot."""
+    R, origin, length = placement.R, placement.origin, linkage.length
+    x, y, z = difference(pivot, origin)
+    return dot(cross((x / length, y / length, z / length), force), (R[0, 1], R[1, 1], R[2, 1]))
 
 
 @kernel
-def _moment_about(linkage, pivot, point, force):
-    """Return the moment (x, y, z) about a pivot of a force (x, y, z) at a point."""
-    x, y, z = difference(point, pivot)
-    return cross((x / linkage.length, y / linkage.length, z / linkage.length), force)
-
-
-@kernel
-def _add_weights(linkage, placement, balance):
+def _add_weights(linkage, placement, B):
     """Add the weights of all parts to the right-hand side."""
     for part in range(5):
         carrier = (part + 1) // 2
@@ -174,20 +163,15 @@ def _add_weights(linkage, placement, balance):
             mass = linkage.rocker_mass
         elif carrier == BOGIE:
             mass = linkage.bogie_mass
-        centre = placement.part_coms[part], (part - 1) % 2, carrier
-        _add_weight(linkage, placement, mass, centre, balance)
+        _add_weight(
+            linkage, placement, B, mass, placement.part_coms[part], (part - 1) % 2, carrier
+        )
     for wheel in range(6):
-        carrier = BOGIE if linkage.on_bogie[wheel] else ROCKER
-        centre = placement.centres[wheel], wheel // 3, carrier
-        _add_weight(linkage, placement, linkage.wheel_mass, centre, balance)
-
-
-@kernel
-def _add_weight(linkage, placement, mass, part, balance):
-    """Add the weight of a mass [kg] of a part, as for `_write_terms`, to the right-hand side."""
-    _write_terms(linkage, placement, part, (0.0, 0.0, -mass / linkage.mass), balance.terms)
-    for row in range(UNKNOWNS):
-        balance.B[row, 0] -= balance.terms[row]
+        side, carrier = wheel // 3, ROCKER
+        if linkage.on_bogie[wheel]:
+            carrier = BOGIE
+        centre = placement.centres[wheel]
+        _add_weight(linkage, placement, B, linkage.wheel_mass, centre, side, carrier)
 
 
 @kernel
@@ -213,3 +197,38 @@ def tool_load(R, tool, i):
     mz = tool[2, 2] + x * fy - y * fx
     force = R[i, 0] * fx + R[i, 1] * fy + R[i, 2] * fz
     return force, R[i, 0] * mx + R[i, 1] * my + R[i, 2] * mz
+
+
+@kernel
+def _add_weight(linkage, placement, B, mass, point, side, carrier):
+    """Add the weight of one part to the right-hand side.
+
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT.
+        B: Right-hand sides; the weight is added to column 0.
+        mass: Mass [kg].
+        point: (3,) centre of mass [m].
+        side: 0 right, 1 left.
+        carrier: The link that it is part of, or hangs on: BODY, ROCKER or BOGIE.
+    """
+    origin, length, weight = placement.origin, linkage.length, mass / linkage.mass
+    B[2, 0] += weight
+    B[3, 0] += (point[1] - origin[1]) / length * weight
+    B[4, 0] -= (point[0] - origin[0]) / length * weight
+    if carrier == BODY:
+        return
+    about = weight * _level_arm(linkage, placement, point, placement.rocker_pivots[side])
+    B[8, 0] += about if side == 0 else -about
+    if carrier == BOGIE:
+        arm = _level_arm(linkage, placement, point, placement.bogie_pivots[side])
+        B[6 + side, 0] += weight * arm
+
+
+@kernel
+def _level_arm(linkage, placement, point, pivot):
+    """Return the horizontal distance of a point from a pivot axis, over the reference length."""
+    R, origin, length = placement.R, placement.origin, linkage.length
+    rx, ry = (point[0] - origin[0]) / length, (point[1] - origin[1]) / length
+    px, py = (pivot[0] - origin[0]) / length, (pivot[1] - origin[1]) / length
+    return (ry - py) * R[0, 1] - (rx - px) * R[1, 1]

@@ -192,6 +192,16 @@ def find_block_max(ground, gx, gy, half_x, half_y):
 
 
 @kernel
+def height_inside(ground, gx, gy):
+    """Return the elevation [m] at (gx, gy) [cells from cell [0, 0]], inside the last row, column.
+
+    Nothing is checked; NaN near unknown cells.
+    """
+    i, j = int64(gy), int64(gx)
+    return _interpolate(ground.elevation, i * ground.columns + j, ground.columns, gx - j, gy - i)
+
+
+@kernel
 def is_cell_on_map(ground, gx, gy):
     """Return whether (gx, gy) [cells from cell [0, 0]] is within the outermost cell centres."""
     return gx >= 0.0 and gy >= 0.0 and gx <= ground.columns - 1 and gy <= ground.rows - 1

@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from rover_physics import Terrain, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
-from rover_physics.terrain.ground import BLOCK, friction_at, height_at_cell, pack_ground
+from rover_physics.terrain.ground import BLOCK, friction_at, height_inside, pack_ground
 from rover_physics.terrain.terrain_file import terrain_presets
 from support.grounds import plane, raised
 
@@ -229,7 +229,7 @@ def test_a_ground_outlives_its_terrain():
     gc.collect()
     assert watched() is None
     _ = [np.full((40, 40), -1.0) for _ in range(50)]  # would take the place of what is freed
-    assert height_at_cell(ground.records[0], 10.3, 20.7) == 0.25
+    assert height_inside(ground.records[0], 10.3, 20.7) == 0.25
     assert friction_at(ground.records[0], 1.0, 2.0, 0.9) == 0.6
     with pytest.raises(TypeError, match="pickle its Terrain"):
         pickle.dumps(ground)
