@@ -61,6 +61,7 @@ def learn(
     from rover_planner.learning.learned_file import describe
     from rover_planner.shell.progress import show_bar
 
+    shared.keep_inputs((rover, terrain, log), out, ground, picture)
     model, map_ = load_rover(rover), load_terrain(terrain, max_cells)
     told = model.friction if friction is None else friction
     if not 0.0 < told < np.inf:

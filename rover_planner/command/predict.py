@@ -100,6 +100,7 @@ def predict(
 
     gc.freeze()
     gc.enable()
+    shared.keep_inputs((rover, terrain, poses, learned), out)
     model, ground = load_rover(rover), load_terrain(terrain, max_cells)
     path = read_poses(poses)
     curvature = read_curvature(poses, len(path))

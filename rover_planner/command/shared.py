@@ -2,12 +2,14 @@
 """The table of arguments and options that several subcommands share, and how others are made."""
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 
@@ -92,6 +94,22 @@ MaxCells = Annotated[
 ]
 MAX_CELLS = 25_000_000
 """Default of the option --max-cells; a test compares it with that of `load_terrain`."""
+
+
+def keep_inputs(inputs: Iterable[str | Path | None], *outputs: Path | None) -> None:
+    """Check that no file that a command writes is one that it reads, or writes already.
+
+    Raises:
+        PlanningError: One is.
+    """
+    known = {os.path.realpath(file) for file in inputs if file is not None}
+    for file in filter(None, outputs):
+        path = os.path.realpath(file)
+        if path in known:
+            raise PlanningError(
+                f"{show_file(file)} is named twice and would be overwritten; write to another file"
+            )
+        known.add(path)
 
 
 def read_arm_angles(rover: "Rover", words: Sequence[str]) -> dict[str, float] | None:

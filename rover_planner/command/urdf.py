@@ -30,6 +30,7 @@ def urdf(
     from rover_physics.rover.urdf.joint_map import map_of
     from rover_physics.rover.urdf.write_urdf import write_urdf
 
+    shared.keep_inputs((rover,), out, joint_map)
     model = load_rover(rover)
     write_urdf(out, model, hardware)
     if joint_map is not None:
@@ -49,6 +50,7 @@ def rover(
     from rover_physics.rover.rover_file import save_rover
     from rover_physics.rover.urdf.read_rover import MAX_TILT, rover_from_urdf
 
+    shared.keep_inputs((from_urdf, joint_map), out)
     read = rover_from_urdf(from_urdf, joint_map)
     comment = (
         f"From {from_urdf.name} by {joint_map.name}. SI units. Positions: left side, body frame\n"

@@ -22,6 +22,7 @@ from rover_planner.figures.pictures import (
     drawing,
     find_extent,
     outlined,
+    zoom,
 )
 from rover_planner.learning.ground_learner import GroundEstimate
 from rover_planner.planning.asked_poses import merge_poses
@@ -102,12 +103,6 @@ def _label_uses(axes: Axes, label: str) -> None:
     axes.set(xlabel="distance along the path [m]", ylabel=label)
 
 
-def _zoom(axes: Axes, places: Floats, margin: float) -> None:
-    """Show the ground around places (n, 2) up to a margin [m]."""
-    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-
-
 def _draw_area(axes: Axes, answer: SearchResult) -> None:
     assert answer.closed is not None
     nodes = answer.nodes
@@ -165,7 +160,7 @@ def draw_advice(path: Path, advice: Advice, map_name: str) -> None:
             place = case.poses[advice.judged.verdict.first_failure]
             axes.plot(*place[:2], "X", color=REFUSED, markersize=11, markeredgecolor="white")
         shown = np.concatenate([case.poses, *(one.judged.case.poses for one in advice.remedies)])
-        _zoom(axes, shown[:, :2], 1.0)
+        zoom(axes, shown[:, :2], 1.0)
         axes.set_title(
             f"{case.rover.name} on {map_name}: {advice.describe()}", loc="left", wrap=True
         )
@@ -209,7 +204,7 @@ def draw_learning(
         )
         figure.colorbar(image, ax=axes, label="friction")
         axes.plot(*places.T, color=INK, linewidth=1.0)
-        _zoom(axes, places, 0.8)
+        zoom(axes, places, 0.8)
         times, known = [one.time for one in estimates], [one.friction for one in estimates]
         low, mean = [one.low for one in known], [one.mean for one in known]
         high = [MOST_FRICTION if one.high is None else one.high for one in known]

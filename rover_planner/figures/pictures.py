@@ -115,3 +115,9 @@ def draw_terrain(axes: Axes, terrain: Terrain) -> Extent:
     extent = find_extent(terrain.origin, terrain.elevation.shape, terrain.resolution)
     draw_ground(axes, np.asarray(terrain.elevation), terrain.resolution, extent)
     return extent
+
+
+def zoom(axes: Axes, places: NDArray[np.float64], margin: float) -> None:
+    """Show the ground around places (n, 2) up to a margin [m]."""
+    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))

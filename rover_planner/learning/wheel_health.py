@@ -8,8 +8,10 @@ from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
+from rover_physics.rover.model import Rover
 from rover_planner.learning.drive_log import HALF_TURN, RATES, ROLL, SUSPENSION, TIME, TORQUES
-from rover_planner.learning.wheel_slip import SlipWindow
+from rover_planner.learning.stuck_watch import SLOWEST
+from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow
 
 RATE = "rate"
 """Word of faults of a wheel's rate."""
@@ -47,9 +49,10 @@ _WATCH = record_type(
 class WheelHealth:
     """Watches torques and rates of the wheels."""
 
-    def __init__(self, weight: float, max_torque: float):
-        """Start with good sensors of a rover of a weight [N] and a largest wheel torque [N m]."""
-        self._weight, self._most = weight, max_torque
+    def __init__(self, rover: Rover):
+        """Start with good sensors."""
+        self._weight, self._most = rover.weight, rover.wheel.max_torque
+        self._slowest = SLOWEST * rover.nominal_speed / rover.wheel.radius
         self._watches = np.zeros(1, _WATCH)
         self._watches["steps"] = np.inf
         self._still = self._watches["still"][0]
@@ -69,8 +72,9 @@ class WheelHealth:
 
     def take(self, row: Floats) -> None:
         """Take a row of measurements."""
-        elapsed = row[TIME] - self._time if row[TIME] > self._time else 0.0
-        _take(row, elapsed, 0.99 * self._most, self._watches)
+        elapsed = row[TIME] - self._time
+        elapsed = elapsed if 0.0 < elapsed <= LONGEST_GAP else 0.0
+        _take(row, elapsed, 0.99 * self._most, self._slowest, self._watches)
         self._time = row[TIME]
 
     def drop_frozen(self, row: Floats) -> Floats:
@@ -134,8 +138,12 @@ class WheelHealth:
 
 
 @kernel
-def _take(row, elapsed, full, watches):
-    """Take a row of measurements; torques of at least `full` [N m] may stand still."""
+def _take(row, elapsed, full, slowest, watches):
+    """Take a row of measurements.
+
+    Torques of at least `full` [N m] may stand still at a wheel that turns no faster than `slowest`
+    [rad/s].
+    """
     watch = watches[0]
     for kind in range(2):
         first = _TORQUES if kind == 0 else _RATES
@@ -147,8 +155,9 @@ def _take(row, elapsed, full, watches):
             if change > CHANGE * watch.steps[kind]:
                 changes += 1
         for wheel in range(WHEEL_COUNT):
-            value = row[first + wheel]
-            stays = value == watch.last[kind, wheel] and not (kind == 0 and abs(value) >= full)
+            value, turns = row[first + wheel], abs(row[_RATES + wheel]) > slowest
+            pushes = kind == 0 and abs(value) >= full and not turns
+            stays = value == watch.last[kind, wheel] and not pushes
             if value != value or (stays and changes >= OTHERS):
                 watch.still[kind, wheel] += elapsed
             elif not stays:

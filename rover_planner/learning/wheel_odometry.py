@@ -82,7 +82,7 @@ class WheelOdometry:
         self.forward, self.side = Regression(FORWARD_PRIOR), Regression(SIDE_PRIOR)
         """Shares of the distance lost ahead and gone aside; may be those of another drive."""
         self._per_torque = len(self._x) / (rover.wheel.radius * rover.weight)
-        self._health = WheelHealth(rover.weight, rover.wheel.max_torque)
+        self._health = WheelHealth(rover)
         self.friction, self.friction_deviation = rover.friction, PRIOR_SPREAD * rover.friction
         """Friction of the ground, as far as it is known, and its standard deviation."""
         self._traction = 0.0

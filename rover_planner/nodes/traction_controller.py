@@ -3,30 +3,30 @@
 
 import sys
 import time
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Header
 from std_srvs.srv import SetBool
 
 from msg_adapters.commands import joint_order
-from msg_adapters.results.diagnostics import traction_diagnostics
+from msg_adapters.results.diagnostics import TORQUES, make_status
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
-from rover_planner.nodes.warm_up import TRACTION, update_traction
+from rover_planner.nodes.warm_up import TRACTION, load_kernels, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
-from rover_planner.shell.kernels import load_kernels
-from rover_planner.traction.clocks import ClockWatch
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
+from rover_planner.traction.input_monitor import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
-from rover_planner.traction.statistics import TractionStatistics
+from rover_planner.traction.statistics import TractionStatistics, judge_update
 from rover_planner.traction.supervisor import TractionSupervisor
 from rover_planner.traction.traction_service import (
     DISABLED,
@@ -126,7 +126,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         started, so there are three subscriptions; a stop may arrive three times.
         """
         self.create_service(SetBool, "~/enable", self._enable)
-        for qos in (topic_qos(), latched_qos(), sensor_qos()):
+        for qos in (TOPIC_QOS, LATCHED_QOS, SENSOR_QOS):
             self.heard.subscribe(Bool, "~/emergency_stop", self._take_emergency_stop, qos)
 
     def _apply_settings(self, settings: TractionSettings) -> None:
@@ -253,23 +253,23 @@ class TractionController(RoverNode[TractionControllerParameters]):
         command = self._command
         if command is None:
             return
-        values = self.statistics.describe() | {
+        problems = [*self._inputs.publishers.problems, *filter(None, [command.warning])]
+        values = {
+            "state": command.state,
+            **self.statistics.describe(),
             "watchdog_trips": self._watchdog.trips,
             "internal_errors": self.guard.total,
             "brake": command.brake,
+            "warning": "; ".join(problems),
         }
-        name, stamp = self.service.settings.rover.name, self.get_clock().now().to_msg()
-        self._topics.diagnostics.publish(
-            traction_diagnostics(
-                values, command.state, command.fault,
-                self._inputs.publishers.problems, name, stamp,
-            )
-        )  # fmt: skip
+        level, text = judge_update(command, problems)
+        status = make_status(TORQUES, level, text, values, self.service.settings.rover.name)
+        header = Header(stamp=self.get_clock().now().to_msg())
+        self._topics.diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    return run_node(NODE_NAME, argv, lambda _: TractionController(), SWITCH_INTERVAL)
+main = partial(run_node, NODE_NAME, TractionController, SWITCH_INTERVAL)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kernels of the nodes beyond those of rover_physics, and the groups of all kernels."""
 
+import itertools
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
+from rover_physics.bounds.path import is_uncertain
+from rover_physics.compilation import NICENESS, Compilation, Step
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
-from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_physics.warm_up import EXACT, UNCERTAIN, bound_poses
 from rover_planner.learning.drive_log import FORCES, TIME, WIDTH
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -39,6 +44,13 @@ def search_paths() -> None:
         ground = Terrain(elevation, 0.05, (0.0, 0.0))
         site = Site(load_rover("lsr1"), ground)
         find_path(SearchQuery(site, *ends), LatticeSettings(budget=60.0, cell=0.4))
+
+
+def prepare_search(site: Site) -> None:
+    """Load all kernels that a search at a site needs, so that its budget is not spent on it."""
+    search_paths()
+    if is_uncertain(site.terrain, site.options.map_sigmas):
+        bound_poses()
 
 
 def search_lattice() -> None:
@@ -119,3 +131,39 @@ GROUPS = (
 )
 """All kernels. The first group compiles the model of a pose once for all that use it, which takes
 two thirds of the time; the second has what needs no such model."""
+
+
+LOADING_DELAY = 1.0
+"""Time that a program has to itself before it loads what it needs later [s]."""
+
+
+def load_kernels(
+    first: Sequence[Step], behind: Sequence[Step], report: Callable[[str], object]
+) -> Compilation:
+    """Load kernels, and begin to load others while the program works.
+
+    Args:
+        first: What is needed at once: this function returns when it is loaded.
+        behind: What is needed later. If `first` must be compiled, it is compiled meanwhile.
+        report: Function that takes a line on each thing that is compiled, which takes seconds.
+
+    Returns:
+        What loads the others; to be closed when the program ends.
+    """
+    background, count = Compilation(behind, NICENESS), itertools.count(1)
+
+    def tell_behind(name: str) -> None:
+        report(f"compiling besides: {name}")
+
+    def tell_first(name: str) -> None:
+        background.start(tell_behind)
+        report(f"compiling kernels {next(count)} of {len(first)}: {name}")
+
+    try:
+        with Compilation(first) as compilation:
+            compilation.run(tell_first)
+    except BaseException:  # such as KeyboardInterrupt
+        background.close()
+        raise
+    background.start(tell_behind, LOADING_DELAY)
+    return background

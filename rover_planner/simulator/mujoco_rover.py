@@ -14,7 +14,11 @@ import numpy as np
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_wxyz
+from rover_physics.numerics.quaternions import (
+    matrix_from_xyzw,
+    rpy_from_xyzw,
+    xyzw_from_wxyz,
+)
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
@@ -288,8 +292,7 @@ class MujocoRover:
 
     def pose(self) -> Floats:
         """Return x, y [m] and yaw [rad] (3,) of the body's origin."""
-        R = self._rotation
-        return np.array([*self._data.qpos[:2], np.arctan2(R[1, 0], R[0, 0])])
+        return np.array([*self._data.qpos[:2], rpy_from_xyzw(self.orientation)[2]])
 
     @property
     def orientation(self) -> Floats:
@@ -304,9 +307,7 @@ class MujocoRover:
     @property
     def attitude(self) -> tuple[float, float]:
         """Roll and pitch [rad], R = Rz(yaw) Ry(pitch) Rx(roll)."""
-        R = self._rotation
-        roll = np.arctan2(R[2, 1], R[2, 2])
-        return float(roll), float(np.arcsin(np.clip(-R[2, 0], -1.0, 1.0)))
+        return rpy_from_xyzw(self.orientation)[:2]
 
     @property
     def body_rates(self) -> Floats:

@@ -12,11 +12,11 @@ rover file; `SteeredDrive` says how the drive waits for them.
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rover_physics.forces.soil import coulomb_slip
 from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import predict_steered
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -328,10 +328,8 @@ class QuasiStaticPlant:
         here, before, duration = self._here, self._before, self._duration
         angles = _suspension(here)
         rates = (angles - _suspension(before)) / duration
-        yaw, (ahead, aside, yaw_rate) = self._pose[2], self._moved
-        roll, pitch = float(here.roll[0]), float(here.pitch[0])
-        roll_rate = (roll - float(before.roll[0])) / duration
-        pitch_rate = (pitch - float(before.pitch[0])) / duration
+        ahead, aside, _ = self._moved
+        turned = _orientation(before).inv() * _orientation(here)
         climb = float(here.position[0, 2] - before.position[0, 2]) / duration
         names = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *self._steering_joints)
         steering = here.steering_angle[0, self._steered]
@@ -340,9 +338,9 @@ class QuasiStaticPlant:
         velocities = np.concatenate([rates, self._wheel_rates, turning])
         return PlantState(
             position=here.position[0].copy(),
-            orientation=xyzw_from_rpy(roll, pitch, yaw),
+            orientation=_orientation(here).as_quat(),
             velocity=np.array([np.hypot(ahead, climb) * np.sign(ahead), aside, 0.0]),
-            body_rates=_body_rates(roll, pitch, roll_rate, pitch_rate, yaw_rate),
+            body_rates=turned.as_rotvec() / duration,
             joint_positions=dict(zip(names, positions.tolist(), strict=True)),
             joint_velocities=dict(zip(names, velocities.tolist(), strict=True)),
             wheel_torques=self._torques.copy(),
@@ -355,14 +353,7 @@ def _suspension(prediction: PathPrediction) -> Floats:
     return np.concatenate([prediction.rocker_angle[0], prediction.bogie_angle[0]])
 
 
-def _body_rates(
-    roll: float, pitch: float, roll_rate: float, pitch_rate: float, yaw_rate: float
-) -> Floats:
-    """Return the angular velocity (3,) [rad/s], body frame, from Euler angles [rad] and rates."""
-    return np.array(
-        [
-            roll_rate - np.sin(pitch) * yaw_rate,
-            np.cos(roll) * pitch_rate + np.sin(roll) * np.cos(pitch) * yaw_rate,
-            -np.sin(roll) * pitch_rate + np.cos(roll) * np.cos(pitch) * yaw_rate,
-        ]
-    )
+def _orientation(prediction: PathPrediction) -> Rotation:
+    """Return the rotation of the body at a waypoint, body to map."""
+    angles = prediction.poses[0, 2], prediction.pitch[0], prediction.roll[0]
+    return Rotation.from_euler("ZYX", angles)

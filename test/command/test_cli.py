@@ -164,6 +164,7 @@ def files(tmp_path, monkeypatch):
     return write_ground_and_path(tmp_path)
 
 
+AHEAD = ["--start=1,2,0", "--goal=3,2,0"]
 PREDICT = ["predict", "lsr1", "terrain.npz", "poses.npz", "out.npz"]
 REFUSED = [
     ([], "command"),
@@ -175,6 +176,13 @@ REFUSED = [
     (["reach", "lsr1", "terrain.npz", "here", "2", "0.5", "2.5", "2.3", "0.3"], "'X'"),
     (["plan", "lsr1", "terrain.npz", "o.npz", "--start=1,2", "--goal=1,0,0"], "'1,2' is no pose"),
     (["replay-plan", "terrain.npz", "o.npz"], "terrain.npz holds no question for a path"),
+    (["predict", "lsr1", "terrain.npz", "poses.npz", "./poses.npz"], "poses.npz is named twice"),
+    (["advise", "lsr1", "terrain.npz", "poses.npz", "terrain.npz"], "terrain.npz is named twice"),
+    (["plan", "lsr1", "terrain.npz", "o.npz", *AHEAD, "--dump", "o.npz"], "o.npz is named twice"),
+    (["replay-plan", "o.npz", "o.npz"], "o.npz is named twice"),
+    (["learn", "lsr1", "terrain.npz", "a.csv", "a.csv"], "a.csv is named twice"),
+    (["urdf", "a.yaml", "a.yaml"], "a.yaml is named twice"),
+    (["rover", "a.yaml", "--from-urdf", "a.urdf", "--map", "a.yaml"], "a.yaml is named twice"),
     (["rover", "out.yaml"], "--from-urdf"),
     (["terrain", "t.npz", "--seed", DIGITS * 20], "--seed"),
     (["study", "\x1b[2J\n\udcff"], "no study file \\x1b[2J\\n\\udcff"),

@@ -167,6 +167,27 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
+@pytest.mark.parametrize("wheels", [3, 6])
+def test_wheels_whose_rates_are_missing_while_the_rover_stands_do_not_slip_and_are_not_stuck(
+    wheels,
+):
+    rows = climb(ROVER, SLOPE, 20.0)[::5]
+    rows[80:, X] -= rows[120, X] - rows[80, X]
+    rows[80:120, X] = rows[80, X]
+    rows[80:120, RATES] *= 0.001
+    rows[80:120, RATES.start : RATES.start + wheels] = np.nan
+    learner = GroundLearner(ROVER, RAMP)
+    assert not any((learner.take(row), learner.stuck)[1] for row in rows)
+    assert learner.estimate.slip_time is None
+
+
+def test_a_torque_that_is_the_same_after_a_gap_is_not_frozen():
+    rows = climb(ROVER, SLOPE, 12.0)[::5]
+    rows[61:, TIME] += 3600.0
+    rows[61:64, TORQUES.start] = rows[60, TORQUES.start]
+    assert not learn(rows[:64]).estimate.faults
+
+
 def test_stamps_that_are_not_regular_make_windows_no_longer():
     rows = climb(ROVER, SLOPE, 12.0)[::5]
     regular = learn(rows).window
@@ -205,6 +226,7 @@ def test_nothing_is_learned_from_rows_without_a_pose():
     ("sensors", "spoil", "word"),
     [
         (TORQUES, lambda one: np.append(one[:20], 0.0 * one[20:] + one[20]), "torque is frozen"),
+        (TORQUES, lambda one: 0.0 * one - ROVER.wheel.max_torque, "torque is frozen"),
         (TORQUES, lambda one: np.nan * one, "no torque"),
         (TORQUES, lambda one: -one, "torque has the wrong sign"),
         (RATES, lambda one: np.append(one[:20], 0.0 * one[20:]), "rate is frozen"),
@@ -218,6 +240,7 @@ def test_a_bad_sensor_is_told_and_not_believed(sensors, spoil, word):
     assert estimate.faults == {"middle_left": word}
     assert estimate.friction.high is None
     assert estimate.friction.low < 1.2 * SLOPE
+    assert abs(estimate.resistance) < 0.1
 
 
 def test_coarse_rates_whose_last_digit_turns_at_three_wheels_only_are_not_frozen():
@@ -226,6 +249,13 @@ def test_coarse_rates_whose_last_digit_turns_at_three_wheels_only_are_not_frozen
     rates[:, :3] += 0.5 * digit
     rows[:, RATES] = digit * np.round(rates / digit)
     assert not learn(rows).estimate.faults
+
+
+def test_a_motor_that_pushes_as_hard_as_it_can_and_stands_has_no_frozen_torque():
+    rows = climb(ROVER, SLOPE, 8.0, speed=0.0)[::2]
+    rows[:, [TORQUES.start + 2, TORQUES.start + 5]] = ROVER.wheel.max_torque
+    learner = learn(rows)
+    assert learner.stuck and not learner.estimate.faults
 
 
 def test_torques_of_a_rover_that_stands_are_not_frozen_because_others_are_missing():

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_planner.planning.path_query import PathQueryOptions, choose
+from rover_planner.planning.path_query import PathQueryOptions, choose, generate_paths
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.site import Site
-from support.grounds import make_terrain
+from support.grounds import make_terrain, rocky
 from support.rovers import LSR1
 
 COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
@@ -24,6 +24,18 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
     assert answer.chosen.verdict.reason in answer.explain()
     best = max(candidate.passable_share for candidate in answer.candidates)
     assert 0 < answer.chosen.passable_share == best < 1
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.8])
+def test_the_chosen_path_is_judged_at_all_its_waypoints(friction):
+    options = PathQueryOptions(accepted_chance=1.0).change(friction=friction)
+    site = Site(LSR1, rocky(41), options)
+    answer = PathJudge(site).search((-1.5, -1.0, 0.5), (1.5, 1.0, 0.5))
+    every = generate_paths(LSR1, (-1.5, -1.0, 0.5), (1.5, 1.0, 0.5), site.options)
+    np.testing.assert_array_equal(answer.chosen.poses, every[answer.choice])
+    alone = PathJudge(site).check(every[answer.choice], stop_at_failure=True)
+    assert answer.chosen.verdict == alone.verdict
+    assert min(len(one.poses) for one in answer.candidates) < 0.6 * len(alone.poses)
 
 
 def test_turns_on_the_spot_before_a_failure_are_no_distance():

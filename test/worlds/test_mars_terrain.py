@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rover_planner.errors import PlanningError
-from rover_planner.worlds import craters, rocks
+from rover_planner.worlds import mars_terrain
 from rover_planner.worlds.mars_terrain import HURST, make_mars_terrain, make_relief
 
 
@@ -58,7 +58,7 @@ def test_impossible_terrains_are_refused_by_name(change, names):
 
 def test_a_fresh_crater_is_a_fifth_as_deep_as_wide():
     r = np.linspace(0, 10, 2001)
-    z = crater = craters.crater_profile(r, 4.0)
+    z = crater = mars_terrain.crater_profile(r, 4.0)
     assert z.max() - z.min() == pytest.approx(0.8, rel=1e-3)
     assert r[np.argmax(z)] == pytest.approx(2.0, abs=0.01)
     assert z.max() == pytest.approx(0.144, rel=1e-2)
@@ -67,7 +67,7 @@ def test_a_fresh_crater_is_a_fifth_as_deep_as_wide():
 
 
 def test_crater_numbers_fall_with_the_square_of_their_diameter():
-    diameters = craters.sample_diameters(np.random.default_rng(2), 0.5, 1e4, 1.0, 50.0)
+    diameters = np.sort(mars_terrain.draw_craters(np.random.default_rng(2), 0.5, 1e4, 50.0))[::-1]
     assert np.all(np.diff(diameters) <= 0)
     for diameter in (1.0, 2.0, 4.0):
         expected = 0.5 * 1e4 * (diameter**-2 - 50.0**-2)
@@ -77,7 +77,7 @@ def test_crater_numbers_fall_with_the_square_of_their_diameter():
 @pytest.mark.parametrize("k", [0.02, 0.19])
 def test_number_of_rocks_integrates_to_the_area_they_cover(k):
     edges = np.geomspace(0.05, 3.0, 3000)
-    numbers = -np.diff(rocks.cumulative_number(k, edges, 3.0))
+    numbers = -np.diff(mars_terrain.count_rocks(k, edges, 3.0))
     middles = 0.5 * (edges[1:] + edges[:-1])
     area = np.sum(numbers * np.pi / 4 * middles**2)
     # F_k(D), the fraction of the ground covered by rocks of a diameter and larger.
@@ -87,24 +87,26 @@ def test_number_of_rocks_integrates_to_the_area_they_cover(k):
 
 def test_drawn_rocks_follow_the_size_frequency_law():
     k, area, smallest, largest = 0.1, 20_000.0, 0.1, 2.0
-    diameters = rocks.sample_diameters(np.random.default_rng(7), k, area, smallest, largest)
+    diameters = mars_terrain.draw_rocks(np.random.default_rng(7), k, area, smallest, largest)
     assert diameters.min() >= smallest
     assert diameters.max() <= largest
     for diameter in (0.1, 0.15, 0.2, 0.3, 0.5):
-        expected = rocks.cumulative_number(k, np.array([diameter]), largest)[0] * area
+        expected = mars_terrain.count_rocks(k, np.array([diameter]), largest)[0] * area
         counted = np.sum(diameters >= diameter)
         assert abs(counted - expected) < 4 * np.sqrt(expected) + 1
 
 
 def test_a_rock_is_half_as_high_as_wide():
     elevation = np.full((81, 81), 1.0)
-    rocks.add_rocks(elevation, 0.01, np.array([40.0]), np.array([40.0]), np.array([0.4]))
+    mars_terrain.add_rocks(elevation, 0.01, np.array([40.0]), np.array([40.0]), np.array([0.4]))
     assert elevation.max() == pytest.approx(1.2)
     assert np.sum(elevation > 1.0) * 1e-4 == pytest.approx(np.pi * 0.04, rel=0.02)
 
 
 def test_a_rock_smaller_than_a_cell_or_at_the_edge_does_no_harm():
     elevation = np.zeros((5, 5))
-    rocks.add_rocks(elevation, 1.0, np.array([1.4, 0.0]), np.array([2.4, 0.0]), np.array([0.2, 3]))
+    mars_terrain.add_rocks(
+        elevation, 1.0, np.array([1.4, 0.0]), np.array([2.4, 0.0]), np.array([0.2, 3])
+    )
     assert np.isfinite(elevation).all()
     assert elevation[0, 0] == pytest.approx(1.5)

@@ -6,13 +6,14 @@ from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
+from msg_adapters.sensors import ImuMounting, imu_to_attitude
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -26,7 +27,8 @@ from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake, are_gridded_alike
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import joints_qos, newest_qos, topic_qos
+from rover_planner.ros.polled_topics import Take
+from rover_planner.ros.qos import NEWEST_QOS, TOPIC_QOS, joints_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.input_monitor import StampError
 from rover_planner.traction.traction_service import (
@@ -42,7 +44,11 @@ ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
 """Joints whose positions are read; a rover has the steering joints of its steered wheels."""
 LONGEST_PERIOD = 0.1
 """Time between two readings of joint states, at most [s]."""
-TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+MENDS: dict[type, str] = {
+    Twist: "set parameter cmd_vel_stamped to false",
+    TwistStamped: "set parameter cmd_vel_stamped to true",
+}
+"""What to do about publishers of these types that are not heard."""
 
 
 class TractionInputs:
@@ -69,9 +75,8 @@ class TractionInputs:
         )
         self._twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         self._log = TransitionLog(node.get_logger())
-        self._subscribe()
         subscribe_to_map(node, PointCloud2, CLOUD, maps.offer)
-        self.publishers = self._check_publishers(parameters)
+        self.publishers = self._subscribe()
         """Looks for publishers that are not heard."""
 
     def to_robot_steering(self, angles: Floats) -> Floats:
@@ -80,28 +85,19 @@ class TractionInputs:
         names = self.joint_names
         return names.signs(joints) * (angles - names.offsets(joints))
 
-    def _subscribe(self) -> None:
-        hear = self._node.heard.subscribe
-        joints, newest = joints_qos(LONGEST_PERIOD), newest_qos()
-        hear(JointState, JOINT_STATES, self._take_joints, joints, refuse=self._refuse)
-        hear(Imu, IMU, self._take_imu, newest, refuse=self._refuse)
-        hear(self._twist, CMD_VEL, self._take_command, newest, refuse=self._refuse)
-        hear(Odometry, ODOMETRY, self._take_odometry, newest, refuse=self._refuse)
-        hear(Bool, STOP, self._take_stop, topic_qos(), refuse=self._refuse)
-
-    def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
-        types = {
-            JOINT_STATES: "sensor_msgs/msg/JointState",
-            IMU: "sensor_msgs/msg/Imu",
-            CMD_VEL: TWIST_STAMPED if parameters.cmd_vel_stamped else TWIST,
-            ODOMETRY: "nav_msgs/msg/Odometry",
-            CLOUD: "sensor_msgs/msg/PointCloud2",
-        }
-        advice = {
-            TWIST: "set parameter cmd_vel_stamped to false",
-            TWIST_STAMPED: "set parameter cmd_vel_stamped to true",
-        }
-        return PublisherCheck(self._node, types, advice)
+    def _subscribe(self) -> PublisherCheck:
+        """Subscribe to all but the map; return what looks for publishers that are not heard."""
+        topics: tuple[tuple[type, str, Take, QoSProfile], ...] = (
+            (JointState, JOINT_STATES, self._take_joints, joints_qos(LONGEST_PERIOD)),
+            (Imu, IMU, self._take_imu, NEWEST_QOS),
+            (self._twist, CMD_VEL, self._take_command, NEWEST_QOS),
+            (Odometry, ODOMETRY, self._take_odometry, NEWEST_QOS),
+            (Bool, STOP, self._take_stop, TOPIC_QOS),
+        )
+        for topic in topics:
+            self._node.heard.subscribe(*topic, refuse=self._refuse)
+        kinds = {name: kind for kind, name, *_ in topics} | {CLOUD: PointCloud2}
+        return PublisherCheck(self._node, kinds, MENDS)
 
     def _refuse(self, name: str, error: Exception, now: float) -> None:
         """Keep why a message is not used; a stamp of no use is no fault by itself."""

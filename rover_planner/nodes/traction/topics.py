@@ -11,7 +11,7 @@ from std_msgs.msg import Bool, Float64MultiArray, String
 from msg_adapters.commands import doubles, labelled_array
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
-from rover_planner.ros.qos import latched_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, TOPIC_QOS
 from rover_planner.traction.traction_service import TractionCommand
 
 STANDING_WHEELS = np.zeros(WHEEL_COUNT)
@@ -31,15 +31,15 @@ class TractionTopics:
         """
 
         def publish(name: str) -> Publisher:
-            return node.create_publisher(Float64MultiArray, name, topic_qos())
+            return node.create_publisher(Float64MultiArray, name, TOPIC_QOS)
 
         self._order, self._signs = order, signs[order]
         self.commands = publish("~/commands")
         self.velocities = publish("~/velocity_commands")
         self.steering = publish("~/steering_commands")
-        self.brake = node.create_publisher(Bool, "~/brake", latched_qos())
-        self.state = node.create_publisher(String, "~/state", latched_qos())
-        self.diagnostics = node.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
+        self.brake = node.create_publisher(Bool, "~/brake", LATCHED_QOS)
+        self.state = node.create_publisher(String, "~/state", LATCHED_QOS)
+        self.diagnostics = node.create_publisher(DiagnosticArray, "diagnostics", TOPIC_QOS)
         self._loads = publish("~/wheel_loads")
         self._used = publish("~/friction_utilisation")
         self._angles = publish("~/contact_angles")

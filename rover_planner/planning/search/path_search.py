@@ -189,7 +189,9 @@ def _weigh_chances(
         totals.append(cost + weight * path.verdict.failure_chance)
         if accepted == 0.0 or cost >= min(totals):
             break
-    best = answers[int(np.argmin(totals)) if totals else 0]
+    if not totals and query.site.options.asked_chance is None:  # what fails for sure may be taken
+        answers.append(_PathFinder(query, settings, memory, on_progress, earlier).answer())
+    best = answers[int(np.argmin(totals)) if totals else -1]
     return replace(
         best,
         seconds_first=answers[0].seconds_first,

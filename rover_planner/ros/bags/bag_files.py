@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
-from rover_planner.ros.optional_types import find_type
+from rover_planner.shell.extras import find_type, name_type
 
 MAP, JOINTS, ODOMETRY, IMU, PATH = "map", "joints", "odometry", "imu", "path"
 TF, TF_STATIC = "tf", "tf_static"
@@ -184,8 +184,7 @@ class BagWriter:
             stamp: Time of its recording [ns].
         """
         if topic not in self._connections:
-            package = type(message).__module__.partition(".")[0]
-            name = f"{package}/msg/{type(message).__name__}"
+            name = name_type(type(message))
             self._connections[topic] = self._writer.add_connection(
                 topic, name, typestore=self._types
             )

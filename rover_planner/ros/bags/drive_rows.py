@@ -34,12 +34,12 @@ def read_rows(path: Path, odometry_topic: str) -> Floats:
                 raise PlanningError(f"{show_file(path)}: has no {kind}")
         for recorded in bag.messages():
             begin = recorded.stamp if begin < 0 else begin
+            time = (recorded.stamp - begin) / NANOSECONDS
             with contextlib.suppress(MessageError):
                 if recorded.kind == JOINTS:
-                    collector.take_joints(recorded.message)
+                    collector.take_joints(recorded.message, time)
                 elif recorded.kind == IMU:
-                    collector.take_imu(recorded.message)
+                    collector.take_imu(recorded.message, time)
                 elif recorded.kind == ODOMETRY:
-                    time = (recorded.stamp - begin) / NANOSECONDS
-                    rows.append(collector.take_odometry(recorded.message, time))
+                    rows.append(collector.take_odometry(recorded.message, time, time))
     return check_rows(np.array(rows).reshape(-1, WIDTH), str(show_file(path)))

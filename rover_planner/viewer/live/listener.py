@@ -2,11 +2,11 @@
 """A node that listens to a rover and its planner, and keeps the latest data for the page."""
 
 import contextlib
+import copy
 import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -33,12 +33,12 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
-    latched_qos,
+    LATCHED_QOS,
+    RESULT_QOS,
+    SENSOR_QOS,
+    SERVICE_QOS,
+    TOPIC_QOS,
     map_subscriptions,
-    result_qos,
-    sensor_qos,
-    service_qos,
-    topic_qos,
 )
 from rover_planner.viewer.live.live_state import (
     CLICK,
@@ -67,50 +67,47 @@ Take = Callable[[Any], None]
 class LiveListener(Node):
     """Keeps the latest values, map, plan and verdict; it skips bad messages with a warning.
 
-    Messages come in one thread and are asked for in another: what they share is frozen, and
-    replaced as a whole; of a click, what comes is added.
+    Messages come in one thread and are asked for in another: a lock guards the data.
     """
 
     def __init__(self, map_frame: str = "map", **node_arguments: Any):
         """Subscribe to the topics of a rover, a traverse_server and a traction_controller."""
         super().__init__("rover_view", **node_arguments)
-        self._frame = map_frame
+        self._frame, self._lock = map_frame, threading.Lock()
         self._data = LiveData()
-        """Without the ages, and without the forces."""
-        self._predicted: Mapping[str, np.ndarray] = {}
-        self._estimated: Mapping[str, np.ndarray] = {}
-        self._ages: dict[str, TopicAge] = {}
+        """Without the forces."""
+        self._predicted: dict[str, np.ndarray] = {}
+        self._estimated: dict[str, np.ndarray] = {}
         self._worked_at: float | None = None
         """Stamp of the last rates of the wheels [s]."""
-        self._click: LiveQuestion | None = None
         self._planner = self.create_client(
-            GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
+            GetPlan, f"{SERVER}/can_traverse", qos_profile=SERVICE_QOS
         )
         self._subscribe()
 
     def _subscribe(self) -> None:
-        sensors, results, numbers = sensor_qos(), result_qos(), Float64MultiArray
+        sensors, results, numbers = SENSOR_QOS, RESULT_QOS, Float64MultiArray
         self._listen(JointState, "joint_states", self._on_joint_states, sensors, is_stream=True)
         self._listen(Odometry, ODOMETRY, self._on_odometry, sensors, is_stream=True)
         for qos, _ in map_subscriptions("either"):
             self._listen(PointCloud2, "elevation_cloud", self._on_cloud, qos)
         self._listen(Path, f"{SERVER}/plan", self._on_plan, results)
         self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, results)
-        self._listen(String, f"{SERVER}/ground_estimate", self._on_ground, latched_qos())
+        self._listen(String, f"{SERVER}/ground_estimate", self._on_ground, LATCHED_QOS)
         for topic, field in PREDICTED_FIELDS.items():
             take = partial(self._on_prediction, field)
             self._listen(numbers, f"{SERVER}/{topic}", take, results)
         for field in ESTIMATED_FIELDS:
             take = partial(self._on_estimate, field)
-            self._listen(numbers, f"{CONTROLLER}/{field}", take, topic_qos(), is_stream=True)
-        self._ages[SIGN_OF_LIFE] = TopicAge(None, True)
-        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, topic_qos())
+            self._listen(numbers, f"{CONTROLLER}/{field}", take, TOPIC_QOS, is_stream=True)
+        self._data.ages[SIGN_OF_LIFE] = TopicAge(None, True)
+        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, TOPIC_QOS)
 
     def _listen(
         self, kind: Any, topic: str, take: Take, qos: QoSProfile, *, is_stream: bool = False
     ) -> None:
         """Subscribe to a topic and note the age of its messages."""
-        age = self._ages[topic] = TopicAge(None, is_stream)
+        age = self._data.ages[topic] = TopicAge(None, is_stream)
 
         def hear(message: Any) -> None:
             age.heard = time.monotonic()
@@ -121,25 +118,29 @@ class LiveListener(Node):
     def _hear(self, what: str, take: Take, message: Any) -> None:
         """Take a message, or warn of one that is bad."""
         try:
-            take(message)
+            with self._lock:
+                take(message)
         except RoverError as error:
             self.get_logger().warning(f"{what} not shown: {error}", throttle_duration_sec=1.0)
 
     def latest(self) -> LiveData:
         """Return the latest data."""
-        data, predicted, silent = self._data, {}, self._ages[SIGN_OF_LIFE].is_stale
-        if data.plan is not None and data.position is not None and not silent:
-            predicted = _read_nearest(self._predicted, data.plan, data.position)
-        estimated = {
-            field: values
-            for field, values in self._estimated.items()
-            if not self._ages[f"{CONTROLLER}/{field}"].is_stale
-        }
-        is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
-        source = "forces predicted by the server" if predicted else ""
-        source = "forces estimated by the traction controller" if is_estimated else source
-        forces = {**predicted, **estimated}
-        return replace(data, forces=forces, forces_from=source, ages=self._ages, click=self._click)
+        with self._lock:
+            data = copy.copy(self._data)
+            predicted, estimated = self._predicted.copy(), self._estimated.copy()
+        for field in ESTIMATED_FIELDS:
+            if data.ages[f"{CONTROLLER}/{field}"].is_stale:
+                estimated.pop(field, None)
+        if data.plan is None or data.position is None or data.ages[SIGN_OF_LIFE].is_stale:
+            predicted = {}
+        else:
+            predicted = _read_nearest(predicted, data.plan, data.position)
+        if not estimated.keys().isdisjoint(PREDICTED_FIELDS.values()):
+            data.forces_from = "forces estimated by the traction controller"
+        elif predicted:
+            data.forces_from = "forces predicted by the server"
+        data.forces = {**predicted, **estimated}
+        return data
 
     def request_plan(self, goal: np.ndarray) -> None:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
@@ -160,13 +161,13 @@ class LiveListener(Node):
             start=stamped_pose(start, self._frame), goal=stamped_pose((*goal, yaw), self._frame)
         )
         hashed = plan_request_hash(request.start, request.goal, 0.0)
-        self._click = click = LiveQuestion(CLICK, hashed, time.monotonic())
+        self._data.click = click = LiveQuestion(CLICK, hashed, time.monotonic())
         take = partial(self._on_answer, click)
         self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
 
     def forget_click(self) -> None:
         """Follow the server's newest verdict again."""
-        self._click = None
+        self._data.click = None
 
     def _on_answer(self, click: LiveQuestion, future: Any) -> None:
         """Take the plan of a click."""
@@ -176,77 +177,65 @@ class LiveListener(Node):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         if any(status.name == HEALTH for status in message.status):
-            self._ages[SIGN_OF_LIFE].heard = time.monotonic()
+            self._data.ages[SIGN_OF_LIFE].heard = time.monotonic()
 
     def _on_joint_states(self, state: JointState) -> None:
         """Take angles and torques, and the work of the wheel motors since their last rates."""
-        known, now = self._data, state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
+        data, now = self._data, state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
         joints, efforts, rates = (
             _name_finite(state.name, values)
             for values in (state.position, state.effort, state.velocity)
         )
-        joints, efforts, passed = {**known.joints, **joints}, {**known.efforts, **efforts}, 0.0
+        data.joints, data.efforts = {**data.joints, **joints}, {**data.efforts, **efforts}
         if rates:
             last = now if self._worked_at is None else self._worked_at
             passed, self._worked_at = max(now - last, 0.0), max(now, last)
-        motors = ((efforts.get(name, 0.0), rates.get(name, 0.0)) for name in WHEEL_JOINTS)
-        energy = known.energy + passed * sum(max(effort * rate, 0.0) for effort, rate in motors)
-        self._data = replace(
-            known, joints=joints, efforts=efforts, time=known.time + passed, energy=energy
-        )
+            motors = ((data.efforts.get(name, 0.0), rates.get(name, 0.0)) for name in WHEEL_JOINTS)
+            data.time += passed
+            data.energy += passed * sum(max(effort * rate, 0.0) for effort, rate in motors)
 
     def _on_odometry(self, odometry: Odometry) -> None:
-        place, known = odometry.pose.pose.position, self._data
+        place, data = odometry.pose.pose.position, self._data
         attitude = read_orientation(odometry.pose.pose.orientation, "odometry orientation")
         position = np.array([place.x, place.y, place.z])
-        if not np.isfinite(position).all():
-            return
-        moved = 0.0
-        if known.position is not None:
-            moved = float(np.hypot(*(position - known.position)[:2]))
-        self._data = replace(
-            known,
-            position=position,
-            attitude=np.array(attitude),
-            speed=float(odometry.twist.twist.linear.x),
-            distance=known.distance + moved,
-        )
+        if np.isfinite(position).all():
+            before = position if data.position is None else data.position
+            data.distance += float(np.hypot(*(position - before)[:2]))
+            data.position, data.attitude = position, np.array(attitude)
+            data.speed = float(odometry.twist.twist.linear.x)
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
-        self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
+        self._data.terrain = terrain_from_point_cloud(cloud)
 
     def _on_ground(self, message: String) -> None:
-        ground, known = parse_learned(message.data, "ground_estimate"), self._data
-        trail = known.trail
-        if known.position is not None:
-            trail = add_to_trail(trail, known.position[:2], ground)
-        self._data = replace(known, learned=ground, trail=trail)
+        data = self._data
+        data.learned = parse_learned(message.data, "ground_estimate")
+        if data.position is not None:
+            data.trail = add_to_trail(data.trail, data.position[:2], data.learned)
 
     def _on_plan(self, plan: Path) -> None:
-        poses = path_to_poses(plan, self._frame) if plan.poses else None
-        self._data = replace(self._data, plan=poses)
+        self._data.plan = path_to_poses(plan, self._frame) if plan.poses else None
 
     def _on_verdict(self, message: DiagnosticArray) -> None:
         """Take a verdict; it is that of the last click, too, if that asked the same."""
         if not message.status:
             return
-        status, now = message.status[0], time.monotonic()
-        self._ages[SIGN_OF_LIFE].heard = now
+        status, now, click = message.status[0], time.monotonic(), self._data.click
+        self._data.ages[SIGN_OF_LIFE].heard = now
         about = {one.key: one.value for one in status.values}
         passes = status.level != DiagnosticStatus.ERROR
         name = f"question {about.get('request', '?')}, {about.get('service', '?')}"
         reason, hashed = "" if passes else status.message, about.get("question_hash", "")
-        self._data = replace(self._data, newest=LiveQuestion(name, hashed, now, passes, reason))
-        click = self._click
+        self._data.newest = LiveQuestion(name, hashed, now, passes, reason)
         if click is not None and click.traversable is None and click.hash == hashed:
             click.since, click.reason, click.traversable = now, reason, passes
 
     def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
-        self._predicted = {**self._predicted, field: array_values(message).copy()}
+        self._predicted[field] = array_values(message).copy()
 
     def _on_estimate(self, field: str, message: Float64MultiArray) -> None:
         if len(message.data) >= 6:  # deviations may follow
-            self._estimated = {**self._estimated, field: np.array(message.data[:6])}
+            self._estimated[field] = np.array(message.data[:6])
 
 
 def _name_finite(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:

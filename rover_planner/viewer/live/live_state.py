@@ -72,7 +72,7 @@ class LiveQuestion:
     """(n, 3) poses of the plan; None without one."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class LiveData:
     """The latest data of a rover and its server; None for what has not come."""
 
@@ -109,7 +109,7 @@ class LiveData:
     trail: Floats = field(default_factory=lambda: np.empty((0, 3)))
     """(n, 3) x, y [m] of the drive and the friction that was known there: measured, or the least
     there is."""
-    ages: Mapping[str, TopicAge] = field(default_factory=dict)
+    ages: dict[str, TopicAge] = field(default_factory=dict)
     """The ages of all topics by name."""
 
     @property

@@ -331,6 +331,16 @@ def test_a_path_costs_as_much_as_its_pieces_each_in_its_gear():
     assert cost_of_path(LSR1, pieces, path) == pytest.approx(alone, rel=0.02)
 
 
+def test_where_any_chance_is_accepted_a_path_that_fails_almost_for_sure_is_found(
+    slippery, monkeypatch
+):
+    """Where chances were weighed, it was refused."""
+    monkeypatch.setattr(path_search, "ASKED", 0.05)  # an almost sure failure takes long to find
+    question = ask_across(replace(slippery, friction=0.0 * slippery.friction + 0.32), 1.0)
+    answer = find_path(question, replace(LONG, cell=0.3, budget=8.0, chance_weight=1.0))
+    assert answer.outcome == FOUND
+
+
 def test_a_search_goes_around_what_may_fail_if_the_weight_of_chances_pays_for_it(slippery):
     question, coarse = ask_across(slippery, 1.0), replace(LONG, cell=0.3)
     straight = find_path(question, coarse).path
