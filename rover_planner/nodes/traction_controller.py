@@ -16,8 +16,7 @@ from msg_adapters.commands import joint_order
 from msg_adapters.results.diagnostics import TORQUES, make_status
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
-from rover_planner.nodes.traction.topics import TractionTopics
+from rover_planner.nodes.traction_topics import TractionInputs, TractionMaps, TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, load_kernels, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames

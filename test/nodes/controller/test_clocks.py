@@ -9,7 +9,7 @@ import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
-from rover_planner.nodes.traction.topics import TractionTopics
+from rover_planner.nodes.traction_topics import TractionTopics
 from support.waiting import wait_until
 
 BOUND = 1.5
