@@ -4,9 +4,8 @@
 Foxglove and ros2 bag read what is written.
 """
 
-import contextlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -226,7 +225,7 @@ def read_rows(path: Path, odometry_topic: str) -> Floats:
         for recorded in bag.messages():
             begin = recorded.stamp if begin < 0 else begin
             time = (recorded.stamp - begin) / NANOSECONDS
-            with contextlib.suppress(MessageError):
+            with suppress(MessageError):
                 if recorded.kind == JOINTS:
                     collector.take_joints(recorded.message, time)
                 elif recorded.kind == IMU:
