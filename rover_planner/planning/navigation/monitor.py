@@ -222,9 +222,7 @@ class PathMonitor:
             return missing
         judged_on = snapshot.terrain, snapshot.settings, snapshot.marked
         before = self._judged_on
-        if before is not None and all(a is b for a, b in zip(before, judged_on, strict=True)):
-            return None
-        if before is not None and sight.time < self._pause_end:
+        if before is not None and (before == judged_on or sight.time < self._pause_end):
             return None
         begin = time.monotonic()
         judgement = self._check_rest(path, snapshot)
