@@ -12,7 +12,7 @@ from rclpy.node import Node
 from benchmarks.measure import Figure
 from benchmarks.processes import CONTROLLER, SERVER, START_TIME, STOP_TIMEOUT, open_nodes
 from rover_planner.demo.child_process import ChildProcess
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import TOPIC_QOS
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.waiting import wait_until
 
@@ -56,7 +56,7 @@ def _measure_learner() -> Figure:
         nodes.start("rover_simulator", terrain_file=GROUND, **start)
         found = {LEARNER: nodes.start(LEARNER)}
         driver = Node("driver", context=nodes.ros.context)
-        commands = driver.create_publisher(TwistStamped, "cmd_vel", topic_qos())
+        commands = driver.create_publisher(TwistStamped, "cmd_vel", TOPIC_QOS)
 
         def drive() -> None:
             command = TwistStamped()

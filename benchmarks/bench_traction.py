@@ -19,7 +19,7 @@ from rover_physics import load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.traction.contact_ekf import Motion
 from rover_planner.nodes.traction_controller import TractionController
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import TOPIC_QOS
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.grounds import rocky
 from support.ros_fixtures import RosRun, hear
@@ -107,7 +107,7 @@ def measure_together() -> list[Figure]:
     ground = make_mars_terrain(1, 24.0, 0.05)
     with open_nodes() as nodes:
         client = nodes.client()
-        heard = hear(client.node, DiagnosticArray, "/diagnostics", topic_qos())
+        heard = hear(client.node, DiagnosticArray, "/diagnostics", TOPIC_QOS)
         nodes.start(SERVER, terrain_file=ground, candidate_count=1)
         client.first_plan(START, GOAL)
         nodes.start(CONTROLLER, rate=RATE, realtime_priority=PRIORITY, enabled_at_start=True)

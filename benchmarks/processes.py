@@ -28,7 +28,7 @@ from std_srvs.srv import Trigger
 from msg_adapters.paths import stamped_pose
 from rover_physics import Terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
-from rover_planner.ros.qos import service_qos, topic_qos
+from rover_planner.ros.qos import SERVICE_QOS, TOPIC_QOS
 from support.project.checkout import TOP
 from support.ros_fixtures import RosRun, call, finish
 from support.waiting import wait_until
@@ -108,11 +108,11 @@ class Client:
         plans = (SERVER, ECHO)
         self._plans = {n: self.node.create_client(GetPlan, f"/{n}/can_traverse") for n in plans}
         self._check = self.node.create_client(
-            Trigger, f"/{SERVER}/check_path", qos_profile=service_qos()
+            Trigger, f"/{SERVER}/check_path", qos_profile=SERVICE_QOS
         )
         self._cancel = self.node.create_client(Trigger, f"/{SERVER}/cancel")
         self._parameters = self.node.create_client(SetParameters, f"/{SERVER}/set_parameters")
-        self._path = self.node.create_publisher(PathMessage, f"/{SERVER}/path", topic_qos())
+        self._path = self.node.create_publisher(PathMessage, f"/{SERVER}/path", TOPIC_QOS)
 
     def connect(self) -> "Client":
         """Wait until the server hears this client and its answers come back; return itself."""

@@ -35,10 +35,10 @@ from std_msgs.msg import Float64MultiArray, String
 
 from benchmarks.processes import START_TIME, STOP_TIMEOUT, NodeProcesses, memory_of, open_nodes
 from benchmarks.stepped_clock import SteppedClock
-from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.sensors import odometry_to_pose
 from rover_physics import save_terrain
 from rover_planner.demo.child_process import ChildProcess
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import SENSOR_QOS, TOPIC_QOS
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.checkout import TOP
 from support.ros_fixtures import RosRun, finish
@@ -80,10 +80,10 @@ class Ear(Node):
         torques = QoSProfile(depth=QUEUE)
         states = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for kind, topic, hear, qos in (
-            (Odometry, "odometry", self._hear_odometry, sensor_qos()),
+            (Odometry, "odometry", self._hear_odometry, SENSOR_QOS),
             (String, "traction_controller/state", self._hear_state, states),
             (Float64MultiArray, "traction_controller/commands", self._hear_torques, torques),
-            (DiagnosticArray, "/diagnostics", self._hear_diagnostics, topic_qos()),
+            (DiagnosticArray, "/diagnostics", self._hear_diagnostics, TOPIC_QOS),
         ):
             self.create_subscription(kind, topic, hear, qos)
 
@@ -172,7 +172,7 @@ class Programs:
 
     def kill(self, name: str) -> None:
         """Kill a program."""
-        if self.running[name].running:
+        if self.running[name].poll() is None:
             os.kill(self.running[name].pid, signal.SIGKILL)
 
 
@@ -221,8 +221,8 @@ class Soak:
             time.sleep(0.5)
             loads.append(os.getloadavg()[0])
             mission = self._programs.running[MISSION]
-            if mission.exit_code is not None:
-                how = _ENDS.get(mission.exit_code) or without_numbers(mission.last_line())
+            if mission.poll() is not None:
+                how = _ENDS.get(mission.returncode) or without_numbers(mission.last_line())
                 self._drives[how] += 1
                 self._start_mission()
             if time.monotonic() > due:
@@ -240,7 +240,9 @@ class Soak:
     def measure(self) -> dict[str, object]:
         """Return memory and latency now."""
         running = self._programs.running
-        memory = {name: memory_of(child) for name, child in running.items() if child.running}
+        memory = {
+            name: memory_of(child) for name, child in running.items() if child.poll() is None
+        }
         return {"memory [MB]": memory, "answer [ms]": self._find_latency()}
 
     def _kill(self) -> None:

@@ -15,10 +15,9 @@ from rover_planner.command.learn import learn
 from rover_planner.command.plan import plan, replay_plan
 from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
-from rover_planner.command.reachable import reachable
 from rover_planner.command.replay import replay
 from rover_planner.command.study import study
-from rover_planner.command.survey import survey
+from rover_planner.command.survey import reachable, survey
 from rover_planner.command.terrain import terrain
 from rover_planner.command.urdf import rover, urdf
 from rover_planner.command.view import view

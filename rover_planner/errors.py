@@ -8,9 +8,22 @@ class PlanningError(RoverError):
     """An invalid request; the text names the argument and the allowed values."""
 
 
-class DemoError(Exception):
-    """A failure of the demo; the text names the part that failed and the reason."""
+class FailedError(Exception):
+    """A part of the system failed; the text names it and the reason."""
+
+    exit_code = 1
+    """That of the program."""
 
 
-class DriveFailedError(Exception):
-    """The rover did not reach the end of its path; the text names the reason."""
+class DemoError(FailedError):
+    """A failure of the demo."""
+
+
+class DriveFailedError(FailedError):
+    """The rover did not reach the end of its path."""
+
+
+class NoAnswerError(FailedError):
+    """What a node waits for did not come in time."""
+
+    exit_code = 4

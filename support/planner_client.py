@@ -22,10 +22,10 @@ from msg_adapters.identity import path_hash
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes import traverse_server
+from rover_planner.nodes import warm_up as kernels
 from rover_planner.nodes.result_topics import RESULTS
 from rover_planner.nodes.traverse_server import TraverseServer
-from rover_planner.ros.qos import latched_qos, map_qos, result_qos, topic_qos
-from rover_planner.shell import kernels
+from rover_planner.ros.qos import LATCHED_QOS, RESULT_QOS, TOPIC_QOS
 from support.messages import odometry_at
 from support.ros_fixtures import RosRun, call
 from support.waiting import wait_until
@@ -62,20 +62,20 @@ class PlannerClient(Node):
         self._answers, self._counts = 0, dict.fromkeys(RESULTS, 0)
         for topic, (kind, _) in RESULTS.items():
             self.create_subscription(
-                kind, f"{SERVER}/{topic}", partial(self._hear, topic), result_qos()
+                kind, f"{SERVER}/{topic}", partial(self._hear, topic), RESULT_QOS
             )
         self.create_subscription(Log, "/rosout", lambda log: self.logs.append(log.msg), 100)
         self.stops: list[tuple[bool, float]] = []
         """Each stop heard, and when [s]."""
-        self.create_subscription(Bool, f"{SERVER}/stop", self._hear_stop, latched_qos())
+        self.create_subscription(Bool, f"{SERVER}/stop", self._hear_stop, LATCHED_QOS)
         self._plan = self.create_client(GetPlan, f"{SERVER}/can_traverse")
         self._check = self.create_client(Trigger, f"{SERVER}/check_path")
         self._map = self.create_client(LoadMap, f"{SERVER}/load_map")
         self._parameters = self.create_client(SetParameters, f"{SERVER}/set_parameters")
-        self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self._path = self.create_publisher(Path, f"{SERVER}/path", topic_qos())
-        self._joints = self.create_publisher(JointState, "joint_states", topic_qos())
-        self._odometry = self.create_publisher(Odometry, "odometry", topic_qos())
+        self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
+        self._path = self.create_publisher(Path, f"{SERVER}/path", TOPIC_QOS)
+        self._joints = self.create_publisher(JointState, "joint_states", TOPIC_QOS)
+        self._odometry = self.create_publisher(Odometry, "odometry", TOPIC_QOS)
 
     def send_cloud(self, cloud: PointCloud2) -> None:
         """Publish a cloud unchanged."""

@@ -142,7 +142,9 @@ def _describe_fault(kind: Any, fault: Any, what: str, at: Key) -> str:
     where, part = show_key((*at, *place)) or what, _part(kind, place)
     if fault["type"] == MISSING_KEY:
         return f"missing key {key}; {where} needs {', '.join(_names(part))}"
-    name, known = str(found[-1]), tuple(part["properties"])
+    # A mapping without keys stands for what is told elsewhere, such as `Limits.further`.
+    known = [key for key, inner in part["properties"].items() if inner.get("properties") != {}]
+    name = str(found[-1])
     key, hint = show_key((*at, *place, name)), suggest(name, known)
     return f"unknown key {key}; {hint}{where} has {', '.join(known)}"
 

@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 from rover_physics.errors import ModelError
@@ -54,6 +55,14 @@ class SweepOptions:
     """True if the rover drives backwards along the poses."""
 
     def __post_init__(self) -> None:
+        for names, kind, must in (
+            (("policy", "soil"), str, "a name"),
+            (("control_margin", "friction", "max_torque", "payload"), Real, "a number"),
+        ):
+            for name in names:
+                value = getattr(self, name)
+                if not isinstance(value, kind) and value is not getattr(SweepOptions, name):
+                    raise ModelError(f"{name} is {value!r}; it must be {must}")
         if self.policy not in POLICIES:
             raise ModelError(
                 f"no torque policy {self.policy!r}; policies are {', '.join(POLICIES)}"
@@ -75,7 +84,7 @@ class SweepOptions:
             if given is not None:
                 object.__setattr__(self, name, tuple(as_vector(name, given).tolist()))
         if self.joint_angles is not None:
-            object.__setattr__(self, "joint_angles", tuple(dict(self.joint_angles).items()))
+            object.__setattr__(self, "joint_angles", _pair_angles(self.joint_angles))
 
     @property
     def direction(self) -> float:
@@ -91,6 +100,21 @@ class SweepOptions:
     def arm_angles(self) -> dict[str, float] | None:
         """Arm angles [rad] by joint name; None if the arm is stowed."""
         return None if self.joint_angles is None else dict(self.joint_angles)
+
+
+def _pair_angles(given: Any) -> JointAngles:
+    """Return arm angles as pairs.
+
+    Raises:
+        ModelError: They are no numbers by name.
+    """
+    try:
+        angles = dict(given)
+    except (TypeError, ValueError):
+        angles = {"": None}
+    if not all(isinstance(angle, Real) for angle in angles.values()):
+        raise ModelError(f"joint_angles is {given!r}; it must be numbers by joint name")
+    return tuple(angles.items())
 
 
 DEFAULT_OPTIONS = SweepOptions()

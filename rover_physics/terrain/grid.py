@@ -95,6 +95,23 @@ class Terrain:
         known = self.ground_class[np.isfinite(self.ground_class)]
         return tuple(np.unique(known).astype(int).tolist())
 
+    @cached_property
+    def fingerprint(self) -> str:
+        """16 hexadecimal digits of SHA-256 over all that defines the terrain, found once.
+
+        The bytes are: resolution, origin x and y as 64-bit floats; then per layer its name, its
+        shape and its values; then the names of the soils. Unknown cells of all kinds of NaN count
+        alike.
+        """
+        digest = hashlib.sha256(np.array([self.resolution, *self.origin], "<f8").tobytes())
+        for name in GRIDS:
+            layer = getattr(self, name)
+            if layer is not None:
+                digest.update(f"{name} {layer.shape} ".encode())
+                digest.update(_bytes(layer).data)
+        digest.update("\n".join(self.soil_names).encode())
+        return digest.hexdigest()[:DIGITS]
+
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Extent (xmin, xmax, ymin, ymax) in [m] between the centres of the outermost cells."""
@@ -239,22 +256,6 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: Any) -> None:
         entries["soil_names"] = np.array(terrain.soil_names)
     with errors_of(path, TerrainError):
         write_npz(path, entries)
-
-
-def fingerprint(terrain: Terrain) -> str:
-    """Return 16 hexadecimal digits of SHA-256 over all that defines a terrain.
-
-    The bytes are: resolution, origin x and y as 64-bit floats; then per layer its name, its shape
-    and its values; then the names of the soils. Unknown cells of all kinds of NaN count alike.
-    """
-    digest = hashlib.sha256(np.array([terrain.resolution, *terrain.origin], "<f8").tobytes())
-    for name in GRIDS:
-        layer = getattr(terrain, name)
-        if layer is not None:
-            digest.update(f"{name} {layer.shape} ".encode())
-            digest.update(_bytes(layer).data)
-    digest.update("\n".join(terrain.soil_names).encode())
-    return digest.hexdigest()[:DIGITS]
 
 
 def _bytes(layer: np.ndarray) -> np.ndarray:

@@ -47,7 +47,7 @@ def advise(
     from rover_planner.advice.advise import STOPPED, grow_within, path_of, refuse
     from rover_planner.advice.case import Case
     from rover_planner.command.prediction_files import read_poses
-    from rover_planner.nodes.warm_up import search_paths
+    from rover_planner.nodes.warm_up import prepare_search
     from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
     from rover_planner.planning.path_query import PathQueryOptions, waypoint_spacing_for
     from rover_planner.planning.search.site import Site
@@ -68,12 +68,13 @@ def advise(
         accepted_chance=accepted_chance,
     )
     path = path_of(model, read_poses(poses), waypoint_spacing_for(model))
-    case = Case(Site(model, load_terrain(terrain, max_cells), options), path)
+    site = Site(model, load_terrain(terrain, max_cells), options)
+    case = Case(site, path)
     advice = None
     try:
         with show_progress() as progress:
             progress("load the model (the first run compiles it)")
-            search_paths()  # so that the budget is not spent on it
+            prepare_search(site)
             for advice in grow_within(case, Budget(budget).check):
                 progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
     except KeyboardInterrupt:

@@ -105,14 +105,14 @@ def _ask(
 ) -> None:
     """Search the path, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
-    from rover_planner.nodes.warm_up import search_paths
+    from rover_planner.nodes.warm_up import prepare_search
     from rover_planner.planning.assumptions import assume
     from rover_planner.planning.search.path_search import find_path
     from rover_planner.shell.progress import show_progress
 
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")
-        search_paths()  # so that the budget is not spent on it
+        prepare_search(question.site)
         progress(f"search a path for {question.site.rover.name}")
         answer = find_path(question, settings)
     if answer.path is not None:

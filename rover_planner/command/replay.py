@@ -169,19 +169,9 @@ class _Results:
 
     def _write_messages(self, answer: "ReplayAnswer") -> None:
         """Write the messages that a server would publish, under its topics."""
-        from std_msgs.msg import Header
-
-        from msg_adapters.stamps import ns_to_stamp
         from rover_planner.nodes.result_topics import RESULTS, ResultMessages
 
-        messages = ResultMessages(
-            answer.judgement,
-            answer.identity,
-            Header(frame_id=self._settings.parameters.map_frame, stamp=ns_to_stamp(answer.stamp)),
-            self._settings.rover,
-            self._settings.parameters,
-            self._inputs,
-        )
+        messages = ResultMessages(answer.judgement, answer.identity, answer.stamp, self._inputs)
         for topic, (_, make) in RESULTS.items():
             self._bag.write(f"/traverse_server/{topic}", make(messages), answer.stamp)
 

@@ -23,17 +23,17 @@ GRACE = 4.0
 _PR_SET_PDEATHSIG = 1
 
 
-class ChildProcess:
+class ChildProcess(subprocess.Popen[str]):
     """A Python module that runs in its own process group."""
 
     def __init__(
         self, module: str, arguments: Sequence[str], environment: Mapping[str, str], log: Path
     ):
-        """Start the module; stderr is written to the file `log`, stdout is read by `lines`."""
+        """Start the module; stderr is written to the file `log`, stdout is a pipe."""
         self.name = module.rpartition(".")[2]
         self.log = log
         with open(log, "wb") as log_file:
-            self._process = subprocess.Popen(
+            super().__init__(
                 [sys.executable, "-m", __spec__.name, str(os.getpid()), module, *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
@@ -44,52 +44,20 @@ class ChildProcess:
                 errors="replace",
             )
 
-    @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._process.pid
-
-    @property
-    def exit_code(self) -> int | None:
-        """Exit code, negative for a signal; None while the process is running."""
-        return self._process.poll()
-
-    @property
-    def running(self) -> bool:
-        """True if the process is still running."""
-        return self.exit_code is None
-
-    def lines(self) -> Iterator[str]:
-        """Yield the lines of standard output until it closes."""
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            yield line.rstrip("\n")
-
     def last_line(self) -> str:
         """Return the last non-empty line of the log."""
         lines = self.log.read_text(errors="replace").splitlines()
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
 
-    def wait(self, seconds: float | None = None) -> int | None:
-        """Wait for the end, if wanted at most for a time [s]; return `exit_code`."""
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(seconds)
-        return self.exit_code
-
-    def send_signal(self, number: int) -> None:
-        """Send a signal to the whole process group."""
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.pid, number)
-
     def stop(self) -> None:
         """End the whole process group: send SIGTERM, wait for GRACE, then kill."""
-        if self.running:
-            self.send_signal(signal.SIGTERM)
-            self.wait(GRACE)
-            self.send_signal(signal.SIGKILL)
-            self.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        if self.poll() is None:
+            for number, seconds in ((signal.SIGTERM, GRACE), (signal.SIGKILL, None)):
+                with suppress(ProcessLookupError, PermissionError, subprocess.TimeoutExpired):
+                    os.killpg(self.pid, number)
+                    self.wait(seconds)
+        if self.stdout is not None:
+            self.stdout.close()
 
 
 @contextmanager

@@ -10,10 +10,9 @@ import dataclasses
 import json
 import os
 import random
-import signal
 import socket
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -204,46 +203,30 @@ def _ask(
     steps: Steps, server: ChildProcess, planner: ChildProcess, mission: Mission
 ) -> list[dict[str, Any]]:
     """Return the server's verdict on each goal, for which the mission planner asks."""
-    with steps.step("start traverse_server and find it over DDS") as status:
-        events = _events(planner, server)
-        _skip_to(events, "publishing the map", planner)
-        status.update("publish the map over DDS")
-        _skip_to(events, "asking", planner)
-    answers: list[dict[str, Any]] = []
-    with steps.step(f"ask for {len(mission.goals)} goals") as status:
-        for event in events:
-            if event["event"] == "answer":
-                answers.append(event["answer"])
-            else:
-                goal = mission.goals[event["goal"] - 1]
-                status.update(f"ask for goal {goal.name} ({goal.intent})")
-        status.update(f"asked for {len(answers)} goals over DDS")
-    if len(answers) != len(mission.goals):
-        _expect_success(planner)
-        raise DemoError(f"{len(answers)} of {len(mission.goals)} goals were answered")
-    return answers
-
-
-def _events(planner: ChildProcess, server: ChildProcess) -> Iterator[dict[str, Any]]:
-    """Yield the mission planner's events; raise DemoError if the server ends."""
 
     def end_together() -> None:
         server.wait()
-        if planner.running:
-            planner.send_signal(signal.SIGTERM)
+        planner.terminate()
 
     threading.Thread(target=end_together, daemon=True).start()
-    for line in planner.lines():
-        yield json.loads(line)
-    if not server.running:
-        raise _failure_of(server)
-
-
-def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess) -> None:
-    """Skip the planner's events up to the first one named `name`."""
-    if not any(event["event"] == name for event in events):
-        _expect_success(planner)
-        raise DemoError(f"{planner.name} ended before {name}")
+    answers: list[dict[str, Any]] = []
+    with steps.step("start traverse_server and find it over DDS") as status:
+        assert planner.stdout is not None
+        for event in map(json.loads, planner.stdout):
+            if event["event"] == "answer":
+                answers.append(event["answer"])
+            elif event["event"] == "asking":
+                goal = mission.goals[event["goal"] - 1]
+                status.update(f"ask for goal {goal.name} ({goal.intent})")
+            else:
+                status.update(event["event"])
+        if server.poll() is not None:
+            raise _failure_of(server)
+        if len(answers) != len(mission.goals):
+            _expect_success(planner)
+            raise DemoError(f"{len(answers)} of {len(mission.goals)} goals were answered")
+        status.update(f"publish the map over DDS and ask for {len(answers)} goals")
+    return answers
 
 
 def _expect_success(child: ChildProcess) -> None:
@@ -255,7 +238,7 @@ def _expect_success(child: ChildProcess) -> None:
 def _failure_of(child: ChildProcess) -> DemoError:
     """Return the error that tells how a child has ended."""
     return DemoError(
-        f"{child.name} ended with code {child.exit_code}: {child.last_line()} (see {child.log})"
+        f"{child.name} ended with code {child.returncode}: {child.last_line()} (see {child.log})"
     )
 
 

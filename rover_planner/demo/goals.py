@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
@@ -17,18 +18,20 @@ from rover_planner.maps.cells import CellGrid, grid_of
 
 Pose = tuple[float, float, float]
 
-_PLAIN_GOALS = 4
-"""Largest number of goals on plain ground; a small map has fewer."""
+_SECTORS = 4
+"""Sectors ahead of the start with a goal on plain ground in each; a small map has fewer."""
+_PLAIN = (0.6, 0.9)
+"""Shares of the way over gentle ground at which such a goal may be."""
 _STARTS = 200
 """Largest number of places that are tried as a start."""
 _RAYS = 72
 """Directions in which the clear distance from a start is measured: every 5 degrees."""
 _VIEWS = 721
-"""Directions in which the known ground around the start is measured: every half degree."""
+"""Directions in which the ground around the start is measured: every half degree."""
 _HALF_CONE = np.deg2rad(50.0)
 """Half angle of the cone ahead of the start that holds the goals on plain ground [rad]."""
 _WIDE_CONE = np.deg2rad(75.0)
-"""Half angle of the cone ahead of the start that holds the goal off the map [rad]."""
+"""Largest turn of a goal from the start's heading that its own heading goes along with [rad]."""
 
 
 @dataclass(frozen=True)
@@ -87,35 +90,28 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1) -> Mission:
     Raises:
         PlanningError: The map has no place where all ground under the rover is known.
     """
-    rng = np.random.default_rng(seed)
     ground = _survey(terrain, rover)
-    start = _choose_start(ground, rng)
-    found = [("plain", pose) for pose in _choose_plain(ground, start, _PLAIN_GOALS, rng)]
+    start = _choose_start(ground, np.random.default_rng(seed))
+    found = []
     for intent, score in _score_cells(ground, start):
-        best = np.unravel_index(np.argmax(score), score.shape)
-        if np.isfinite(score[best]):
-            found.append((intent, _facing(start, *ground.grid.places(best[1], best[0]))))
+        row, column = np.unravel_index(np.argmax(score), score.shape)
+        if np.isfinite(score[row, column]):
+            found.append((intent, ground.grid.places(column, row)))
     found.append(("off the map", _choose_off_map(ground, start)))
-    goals = (Goal(chr(ord("A") + k), intent, pose) for k, (intent, pose) in enumerate(found))
-    return Mission(start, tuple(goals))
-
-
-def footprint_radius(rover: Rover) -> float:
-    """Return the largest horizontal distance [m] of the wheels from the body origin."""
-    wheel = rover.wheel
-    return max(
-        float(np.hypot(abs(x) + wheel.radius, abs(y) + 0.5 * wheel.width))
-        for x, y, _ in rover.suspension.wheels.values()
+    goals = (
+        Goal(chr(ord("A") + k), intent, _facing(start, *place))
+        for k, (intent, place) in enumerate(found)
     )
+    return Mission(start, tuple(goals))
 
 
 def _survey(terrain: Terrain, rover: Rover) -> _Ground:
     """Measure slopes and steps under a rover centred on each cell."""
-    known = np.isfinite(terrain.elevation)
+    known, reach = np.isfinite(terrain.elevation), swing_radius(rover) + rover.wheel.radius
     # Unknown cells get the nearest known height, so that the rim of a gap is not a step.
     nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
     z = terrain.elevation[tuple(nearest)]
-    side = _odd_cells(2 * footprint_radius(rover), terrain.resolution)
+    side = _odd_cells(2 * reach, terrain.resolution)
     whole = ndimage.minimum_filter(known, side, mode="constant", cval=False)
     if not whole.any():
         raise PlanningError(
@@ -130,15 +126,14 @@ def _survey(terrain: Terrain, rover: Rover) -> _Ground:
     worst = ndimage.maximum_filter(rise, side)
     gentle_slope = 0.5 * np.tan(rover.limits.tilt)
     difficulty = np.maximum(slope / gentle_slope, worst / rover.wheel.radius)
-    wheelbase = 2 * footprint_radius(rover)
     return _Ground(
         terrain,
         grid_of(terrain),
         np.where(whole, slope, np.nan),
         whole & (slope <= gentle_slope),
         np.where(whole, difficulty, np.nan),
-        far=8 * wheelbase,
-        near=1.5 * wheelbase,
+        far=16 * reach,
+        near=3 * reach,
     )
 
 
@@ -171,81 +166,62 @@ def _sight(ground: _Ground, clear: NDArray[np.bool_], places, bearings) -> NDArr
     return np.asarray(step * np.cumprod(seen, axis=2).sum(axis=2), float)
 
 
-def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
-    """Choose goals in sight of the start, in directions spread over a cone ahead."""
-    bearings = start[2] + np.linspace(-_HALF_CONE, _HALF_CONE, 4 * count + 1)
-    sight = _sight(ground, ground.gentle, np.array([start]), bearings)[0]
-    goals: list[Pose] = []
-    for sector in np.array_split(np.arange(len(bearings)), count):
-        ray = sector[np.argmax(sight[sector])]
-        if sight[ray] < ground.near:
-            continue
-        distance = max(ground.near, rng.uniform(0.6, 0.9) * sight[ray])
-        x = start[0] + distance * np.cos(bearings[ray])
-        y = start[1] + distance * np.sin(bearings[ray])
-        goal = _facing(start, *_gentlest_near(ground, x, y))
-        away = [np.hypot(goal[0] - p[0], goal[1] - p[1]) for p in (start, *goals)]
-        if away[0] > 0.75 * ground.near and min(away) > 0.5 * ground.near:
-            goals.append(goal)
-    return goals
-
-
-def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[Any, Any]:
-    """Return the place with the least difficulty around a point."""
-    column, row = map(round, ground.grid.coordinates(x, y))
-    around = max(1, round(0.06 * ground.far / ground.terrain.resolution))
-    j, i = max(0, row - around), max(0, column - around)
-    window = ground.difficulty[j : row + around + 1, i : column + around + 1]
-    window = np.where(np.isfinite(window), window, np.inf)
-    best = np.unravel_index(np.argmin(window), window.shape)
-    return ground.grid.places(best[1] + i, best[0] + j)
-
-
 def _score_cells(ground: _Ground, start: Pose) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """Yield the intents of hard goals and how well each cell (ny, nx) suits; -inf: it does not.
+    """Yield the intents of goals on the map and how well each cell (ny, nx) suits; -inf: not.
 
-    Those ahead of the start are preferred: difficult places with known ground all the way, steep
-    known ground, and near places that are well inside unknown ground.
+    They are plain ones, far ahead over gentle ground, and hard ones, preferably ahead: difficult
+    places with known ground all the way, steep known ground, and near places that are well inside
+    unknown ground.
     """
     ny, nx = ground.slope.shape
     x, y = ground.grid.places(np.arange(nx), np.arange(ny)[:, None])
-    dx, dy = x - start[0], y - start[1]
-    distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
-    turn = np.abs(wrap(bearing - start[2]))
-    ahead, known = 1 - turn / (2 * np.pi), np.isfinite(ground.slope)
-    bearings = np.linspace(-np.pi, np.pi, _VIEWS)
-    sight = _sight(ground, known, np.array([start]), bearings)[0]
+    distance, turn = _measure_way(start, x, y)
+    bearings = start[2] + np.linspace(-np.pi, np.pi, _VIEWS)
+    known = np.isfinite(ground.slope)
+    gentle_way, known_way = (
+        np.interp(start[2] + turn, bearings, _sight(ground, clear, np.array([start]), bearings)[0])
+        for clear in (ground.gentle, known)
+    )
+    ahead = 1 - np.abs(turn) / (2 * np.pi)
     depth = ndimage.distance_transform_edt(np.pad(np.isnan(ground.terrain.elevation), 1))
     depth = depth[1:-1, 1:-1] * ground.terrain.resolution
+    low, high = _PLAIN
+    plain = ground.gentle & (distance >= low * gentle_way) & (distance <= high * gentle_way)
+    across = _SECTORS * (0.5 + 0.5 * turn / _HALF_CONE)  # in sectors, from the right
+    easy = distance * (1 - np.abs(across % 1 - 0.5)) - 3 * ground.near * ground.difficulty
     for intent, suits, score in (
-        ("rough", known & (distance < np.interp(bearing, bearings, sight)), ground.difficulty),
-        ("steep", known & (distance <= 1.2 * ground.far), ground.slope),
-        ("unknown ground", depth > 0.1 * ground.near, None),
+        *(("plain", plain & (np.floor(across) == k), easy) for k in range(_SECTORS)),
+        ("rough", known & (distance < known_way), ground.difficulty * ahead),
+        ("steep", known & (distance <= 1.2 * ground.far), ground.slope * ahead),
+        ("unknown ground", depth > 0.1 * ground.near, -distance * (1 + 2 * np.abs(turn))),
     ):
-        value = -distance * (1 + 2 * turn) if score is None else score * ahead
-        yield intent, np.where(suits & (distance >= ground.near), value, -np.inf)
+        yield intent, np.where(suits & (distance >= ground.near), score, -np.inf)
 
 
-def _choose_off_map(ground: _Ground, start: Pose) -> Pose:
+def _measure_way(start: Pose, x: Any, y: Any) -> tuple[Any, Any]:
+    """Return the distance [m] to places from a start, and the turn to them [rad]."""
+    dx, dy = x - start[0], y - start[1]
+    return np.hypot(dx, dy), wrap(np.arctan2(dy, dx) - start[2])
+
+
+def _choose_off_map(ground: _Ground, start: Pose) -> tuple[float, float]:
     """Choose a point beyond the nearest edge of the map ahead."""
+    left, right, low, high = ground.terrain.bounds
     bearings = start[2] + np.linspace(-_WIDE_CONE, _WIDE_CONE, 61)
-    xmin, xmax, ymin, ymax = ground.terrain.bounds
+    ahead, here = np.stack([np.cos(bearings), np.sin(bearings)], axis=1), np.array(start[:2])
     with np.errstate(divide="ignore"):
-        along_x = np.where(np.cos(bearings) > 0, xmax - start[0], start[0] - xmin)
-        along_y = np.where(np.sin(bearings) > 0, ymax - start[1], start[1] - ymin)
-        edge = np.minimum(along_x / abs(np.cos(bearings)), along_y / abs(np.sin(bearings)))
-    nearest = int(np.argmin(edge))
-    distance = max(edge[nearest], 0.5 * ground.near) + 0.5 * ground.near
-    x = start[0] + distance * np.cos(bearings[nearest])
-    y = start[1] + distance * np.sin(bearings[nearest])
-    return _facing(start, x, y)
+        room = np.abs((np.where(ahead > 0, (right, high), (left, low)) - here) / ahead)
+    edge = room.min(axis=1)
+    k = np.argmin(edge)
+    x, y = here + (max(edge[k], 0.5 * ground.near) + 0.5 * ground.near) * ahead[k]
+    return x, y
 
 
 def _facing(start: Pose, x: float, y: float) -> Pose:
     """Return a pose at x, y [m] with the end heading of a gentle curve from the start."""
-    bearing = np.arctan2(y - start[1], x - start[0])
-    turn = float(wrap(bearing - start[2]))
-    return (float(x), float(y), float(bearing + (0.5 * turn if abs(turn) < _WIDE_CONE else 0.0)))
+    turn = float(_measure_way(start, x, y)[1])
+    heading = start[2] + (1.5 * turn if abs(turn) < _WIDE_CONE else turn)
+    return (float(x), float(y), heading)
 
 
 def _odd_cells(width: float, resolution: float) -> int:

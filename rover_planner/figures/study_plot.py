@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws a study: the objective over one or two parameters, or over the trials."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,10 +12,11 @@ from matplotlib.figure import Figure
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.figures.pictures import WHEEL_COLOURS, drawing
-from rover_planner.studies.runner import StudyResult, describe_ties
+from rover_planner.studies.runner import StudyResult, Trial, describe_ties
 from rover_planner.studies.study_file import OBJECTIVES, label_of, name_thing
 
-POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
+POINT, BEST = "#0072B2", "#D55E00"
+NOW = {"marker": "s", "color": "#009E73", "markersize": 7, "label": "as it is"}
 """Colours that are safe for colour-blind readers (Okabe and Ito); each has its own marker."""
 SIZE = (6.0, 4.0)
 """Width and height of the picture [inch]."""
@@ -27,26 +30,19 @@ def draw_study(result: StudyResult, path: Path) -> None:
     Raises:
         PlanningError: The file cannot be written, or no trial could be judged.
     """
-    with drawing(path, SIZE) as figure:
-        _draw(figure, result)
-
-
-def _draw(figure: Figure, result: StudyResult) -> None:
-    axes = _draw_shares(figure, result)
-    if len(result.study.parameters) == 1:
-        _draw_curve(axes, result)
-    elif len(result.study.parameters) == 2:
-        _draw_map(figure, axes, result)
-    else:
-        _draw_progress(axes, result)
-    _, what, unit = OBJECTIVES[result.study.objective]
-    best = result.best
+    study, best = result.study, result.best
+    _, what, unit = OBJECTIVES[study.objective]
+    labels = [label_of(name_thing(one.name), one.unit) for one in study.parameters]
     at = ", ".join(
         f"{name_thing(parameter.name)} {value:.4g} {parameter.unit}".rstrip()
-        for parameter, value in zip(result.study.parameters, best.values, strict=True)
+        for parameter, value in zip(study.parameters, best.values, strict=True)
     )
     lines = [f"{what}: best {best.objective:.4g} {unit}", f"at {at}", describe_ties(result)]
-    axes.set_title("\n".join(filter(None, lines)), fontsize=9)
+    draw = {1: _draw_curve, 2: _draw_map}.get(len(labels), _draw_progress)
+    with drawing(path, SIZE) as figure:
+        axes = _draw_shares(figure, result)
+        draw(axes, result, [*labels, label_of(what, unit)])
+        axes.set_title("\n".join(filter(None, lines)), fontsize=9)
 
 
 def _draw_shares(figure: Figure, result: StudyResult) -> Axes:
@@ -73,24 +69,23 @@ def _draw_shares(figure: Figure, result: StudyResult) -> Axes:
     return main
 
 
-def _draw_curve(axes: Axes, result: StudyResult) -> None:
-    parameter, study = result.study.parameters[0], result.study
-    points = np.array(sorted((t.values[0], t.objective) for t in result.trials))
-    axes.plot(points[:, 0], points[:, 1], "-o", color=POINT, markersize=3)
-    if study.resolution:
+def _mark(axes: Axes, trial: Trial, **style: Any) -> None:
+    """Mark a trial by its first two numbers: the parameters, then the objective."""
+    axes.plot(*(*trial.values, trial.objective)[:2], linestyle="", **style)
+
+
+def _draw_curve(axes: Axes, result: StudyResult, labels: Sequence[str]) -> None:
+    points = np.array(sorted((*t.values, t.objective) for t in result.trials))
+    axes.plot(*points.T, "-o", color=POINT, markersize=3)
+    if result.study.resolution:
         _draw_band(axes, result, points)
-    now = result.baseline
-    axes.plot(now.values[0], now.objective, "s", color=NOW, markersize=7, label="as it is")
-    axes.plot(
-        result.best.values[0], result.best.objective, "o", color=BEST, markersize=8, label="best"
-    )
+    _mark(axes, result.baseline, **NOW)
+    _mark(axes, result.best, marker="o", color=BEST, markersize=8, label="best")
     for k, tie in enumerate(result.ties):
-        axes.plot(tie.values[0], tie.objective, "o", color=BEST, markerfacecolor="none",
-                  markersize=10, label="as good" if k == 0 else None)  # fmt: skip
+        ring: dict[str, Any] = {"marker": "o", "color": BEST, "fillstyle": "none"}
+        _mark(axes, tie, markersize=10, label="as good" if k == 0 else None, **ring)
     axes.legend(fontsize=8)
-    _, what, unit = OBJECTIVES[study.objective]
-    axes.set_xlabel(label_of(name_thing(parameter.name), parameter.unit))
-    axes.set_ylabel(label_of(what, unit))
+    axes.set(xlabel=labels[0], ylabel=labels[1])
 
 
 def _draw_band(axes: Axes, result: StudyResult, points: Floats) -> None:
@@ -110,30 +105,20 @@ def _draw_band(axes: Axes, result: StudyResult, points: Floats) -> None:
                       color=WHEEL_COLOURS[axle], label=words)  # fmt: skip
 
 
-def _draw_map(figure: Figure, axes: Axes, result: StudyResult) -> None:
-    first, second = result.study.parameters
-    values = np.array([trial.values for trial in result.trials])
-    objective = np.array([trial.objective for trial in result.trials])
-    points = axes.scatter(values[:, 0], values[:, 1], c=objective, cmap="cividis", s=40)
-    axes.plot(*result.baseline.values, "s", color=NOW, markersize=7, label="as it is")
-    axes.plot(
-        *result.best.values, "o", markerfacecolor="none", color=BEST, markersize=12, label="best"
-    )
+def _draw_map(axes: Axes, result: StudyResult, labels: Sequence[str]) -> None:
+    x, y, objective = np.array([(*trial.values, trial.objective) for trial in result.trials]).T
+    points = axes.scatter(x, y, c=objective, cmap="cividis", s=40)
+    _mark(axes, result.baseline, **NOW)
+    _mark(axes, result.best, marker="o", fillstyle="none", color=BEST, markersize=12, label="best")
     axes.legend()
-    _, what, unit = OBJECTIVES[result.study.objective]
-    figure.colorbar(points, ax=axes, label=label_of(what, unit))
-    axes.set_xlabel(label_of(name_thing(first.name), first.unit))
-    axes.set_ylabel(label_of(name_thing(second.name), second.unit))
+    axes.figure.colorbar(points, ax=axes, label=labels[2])
+    axes.set(xlabel=labels[0], ylabel=labels[1])
 
 
-def _draw_progress(axes: Axes, result: StudyResult) -> None:
+def _draw_progress(axes: Axes, result: StudyResult, _labels: Sequence[str]) -> None:
     objective = np.array([trial.objective for trial in result.trials])
-    best = (
-        np.fmax.accumulate(objective)
-        if result.study.wants_largest
-        else np.fmin.accumulate(objective)
-    )
+    better = np.fmax if result.study.wants_largest else np.fmin
     axes.plot(objective, ".", color=POINT, label="tried")
-    axes.plot(best, "-", color=BEST, label="best so far")
+    axes.plot(better.accumulate(objective), "-", color=BEST, label="best so far")
     axes.set_xlabel("trial")
     axes.legend(frameon=False)

@@ -9,7 +9,7 @@ simulator.
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -179,7 +179,7 @@ class GroundLearner:
         self._way = 0.0
         self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
         self._marked, self._mark_time = np.full((WHEEL_COUNT, 2), np.inf), -math.inf
-        self._time = -math.inf
+        self._time = self._rate_time = -math.inf
         self._recent: deque[tuple[Floats, Floats, Floats]] = deque(maxlen=WINDOW)
         self._resistance, self._resistance_square, self._steady = 0.0, 0.0, 0.0
         self._slip_time: float | None = None
@@ -208,15 +208,17 @@ class GroundLearner:
         was_overtaken = -LONGEST_GAP < time - last < 0.0
         if not math.isfinite(time) or was_overtaken:
             return False
+        self._health.take(row)
+        row = self._health.drop_frozen(row)
         elapsed, self._time, new = time - last, time, False
-        if not 0.0 <= elapsed <= LONGEST_GAP or self._jumps(row):
+        unrolled = abs(time - self._rate_time)
+        if np.isfinite(row[RATES]).any():
+            self._rate_time = time
+        if not 0.0 <= elapsed <= LONGEST_GAP or unrolled > LONGEST_GAP or self._jumps(row):
             elapsed, self._block_end = 0.0, np.inf
             self._windows.begin()
             self._recent.clear()
             self._slipping[:] = 0
-        else:
-            self._health.take(row)
-            row = self._health.drop_frozen(row)
         is_full = time >= self._block_end - EARLY * elapsed
         if is_full and (self._block["known"][0, : SUSPENSION.stop] > 0.0).all():
             new = self._think(self._block[0])
@@ -243,6 +245,7 @@ class GroundLearner:
         rates = np.where(known[RATES] > 0.0, row[RATES], 0.0)
         still = 1e-3 * self._rover.wheel.max_speed
         self._forward = np.where(np.abs(rates) > still, np.sign(rates), self._forward)
+        row[RATES][self._health.doubtful] = np.nan
         measured = known[TORQUES] > 0.5 * count
         if measured.any() and not measured.all():
             row[TORQUES] = np.where(measured, row[TORQUES], np.nanmean(row[TORQUES]))
@@ -292,19 +295,21 @@ class GroundLearner:
         elapsed: float,
     ) -> None:
         health, faults = self._health, self._health.faults
-        turning = ~health.doubtful & ~health.rolls_backward(window)
+        rows = np.array([row for row, _, _ in self._recent])
+        known = np.isfinite(rows[:, RATES]).all(axis=0)
+        turning = known & ~health.rolls_backward(window)
         turning &= np.array([RATE not in faults.get(name, "") for name in WHEELS])
         good = measured & turning & np.array([name not in faults for name in WHEELS])
         slipping = self._find_slips(window)
         health.take_window(window, elapsed, not slipping.any())
-        self._slipping = np.where(slipping, self._slipping + 1, 0)
-        lasting = (self._slipping >= LASTING) & turning
+        self._slipping = np.where(slipping & turning, self._slipping + 1, 0)
+        lasting = self._slipping >= LASTING
         if lasting.any() and self._slip_time is None:
             self._slip_time = window.time
-        rows = np.array([row for row, _, _ in self._recent])
         torques = rows[:, TORQUES].mean(axis=0)
         climb = _find_change(rows[:, [PITCH, *_ANGLES]])
-        stuck = self._stuck.update(window, torques, climb, self.commanded)
+        seen = replace(window, rolling=np.where(known, window.rolling, 0.0))
+        stuck = self._stuck.update(seen, torques, climb, self.commanded)
         if stuck and self._immobilised_time is None:
             self._immobilised_time = window.time
         steady = abs(window.unsteadiness) < MAX_UNSTEADY * self._rover.gravity * window.duration

@@ -11,7 +11,7 @@ from rover_physics.numerics.records import record_type
 from rover_physics.rover.model import Rover
 from rover_planner.learning.drive_log import HALF_TURN, RATES, ROLL, SUSPENSION, TIME, TORQUES
 from rover_planner.learning.stuck_watch import SLOWEST
-from rover_planner.learning.wheel_slip import SlipWindow
+from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow
 
 RATE = "rate"
 """Word of faults of a wheel's rate."""
@@ -72,7 +72,8 @@ class WheelHealth:
 
     def take(self, row: Floats) -> None:
         """Take a row of measurements."""
-        elapsed = row[TIME] - self._time if row[TIME] > self._time else 0.0
+        elapsed = row[TIME] - self._time
+        elapsed = elapsed if 0.0 < elapsed <= LONGEST_GAP else 0.0
         _take(row, elapsed, 0.99 * self._most, self._slowest, self._watches)
         self._time = row[TIME]
 

@@ -17,7 +17,7 @@ from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import latched_qos
+from rover_planner.ros.qos import LATCHED_QOS
 
 NOTHING_REFUSED = "no path was refused yet; ask ~/can_traverse or ~/check_path first"
 
@@ -40,7 +40,7 @@ class AdviceTopics:
     def __init__(self, node: RoverNode[TraverseServerParameters], desk: QuestionDesk):
         self._node, self._desk = node, desk
         self._refused: PathJudgement | None = None
-        self._growing = node.create_publisher(String, "~/advice", latched_qos())
+        self._growing = node.create_publisher(String, "~/advice", LATCHED_QOS)
         wake = partial(node.handover.call, self._deliver)
         self._queue = QuestionQueue(self._seek, wake, node.guard.report)
         serve_later(node, Trigger, "~/advise", self._advise)

@@ -6,9 +6,9 @@ from dataclasses import replace
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from std_srvs.srv import Trigger
 
+from msg_adapters.commands import target_to_point, wrench_to_force_and_moment
 from msg_adapters.errors import MessageError
 from msg_adapters.results.diagnostics import to_json
-from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters

@@ -5,8 +5,8 @@ import json
 import math
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
@@ -17,10 +17,8 @@ from std_msgs.msg import Bool, String
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
-from msg_adapters.imu import ImuMounting
 from msg_adapters.joints import read_joint_map
-from msg_adapters.odometry import planar_odometry
-from msg_adapters.sensing import BASE_FRAME
+from msg_adapters.sensors import BASE_FRAME, ImuMounting, planar_odometry
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -33,21 +31,20 @@ from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.learning.stuck_watch import find_place_ahead
 from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.warm_up import LEARNING
+from rover_planner.nodes.warm_up import LEARNING, load_kernels
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import (
+    LATCHED_QOS,
+    NEWEST_QOS,
+    POLLED_QOS,
+    RESULT_QOS,
+    TOPIC_QOS,
     joints_qos,
-    latched_qos,
-    newest_qos,
-    polled_qos,
-    result_qos,
-    topic_qos,
 )
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
-from rover_planner.shell.kernels import load_kernels
 
 NODE_NAME = "ground_learner"
 ESTIMATE, EMERGENCY_STOP = "traverse_server/ground_estimate", "traction_controller/emergency_stop"
@@ -83,18 +80,17 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self.heard_until = 0.0
         """Time of the last odometry [s]."""
         self._commanded, self._command_time, self._sent, self._stuck = 0.0, -1e9, -1e9, ""
-        self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
-        self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
-        self._marks = self.create_publisher(String, MARK_PLACE, result_qos())
+        self._estimates = self.create_publisher(String, ESTIMATE, LATCHED_QOS)
+        self._stops = self.create_publisher(Bool, EMERGENCY_STOP, LATCHED_QOS)
+        self._marks = self.create_publisher(String, MARK_PLACE, RESULT_QOS)
         self._wheels = WheelOdometry(self._rover)
         self._wheels_told = -math.inf  # time of the last odometry of the wheels that was sent
-        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", topic_qos())
-        hear, rows = self.heard.subscribe, self._rows
-        hear(TwistStamped, "cmd_vel", self._take_command, newest_qos())
-        joints = joints_qos(POLLING)
-        hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), joints)
-        hear(Imu, "imu", self._take_imu, polled_qos())
-        hear(Odometry, "odometry", self._take_odometry, polled_qos())
+        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", TOPIC_QOS)
+        hear = self.heard.subscribe
+        hear(TwistStamped, "cmd_vel", self._take_command, NEWEST_QOS)
+        hear(JointState, "joint_states", self._take_joints, joints_qos(POLLING))
+        hear(Imu, "imu", self._take_imu, POLLED_QOS)
+        hear(Odometry, "odometry", self._take_odometry, POLLED_QOS)
         # By ROS time: where /clock runs fast, more comes in a steady time than queues hold.
         self.loop = self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(self, PointCloud2, CLOUD, self._take_map)
@@ -138,12 +134,16 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         )
         self._wheel_odometry.publish(message)
 
+    def _take_joints(self, joints: Any, _arrival: float) -> None:
+        self._rows.take_joints(joints, self.seconds)
+
     def _take_imu(self, imu: Any, _arrival: float) -> None:
         """Take attitude and yaw rate, and go on by what the wheels turned."""
-        self._rows.take_imu(imu)
+        self._rows.take_imu(imu, self.seconds)
         yaw_rate = self._rows.yaw_rate
         if not math.isnan(yaw_rate):
-            self._wheels.take(self._rows.at(self._time_of(imu) / NANOSECONDS), yaw_rate)
+            row = self._rows.at(self._time_of(imu) / NANOSECONDS, self.seconds)
+            self._wheels.take(row, yaw_rate)
 
     def _time_of(self, message: Any) -> int:
         """Return the stamp of a message, or the present time if it has none [ns]."""
@@ -151,7 +151,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
 
     def _take_odometry(self, odometry: Any, _arrival: float) -> None:
         now = self._time_of(odometry) / NANOSECONDS
-        row = self._rows.take_odometry(odometry, now, self.values.map_frame)
+        row = self._rows.take_odometry(odometry, now, self.seconds, self.values.map_frame)
         self.heard_until = now
         self._wheels.learn(row[[X, Y, YAW]])
         learner = self.learner
@@ -178,9 +178,8 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             self._estimates.publish(String(data=json.dumps(contents)))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    return run_node(NODE_NAME, argv, lambda _: GroundLearnerNode())
+main = partial(run_node, NODE_NAME, GroundLearnerNode)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

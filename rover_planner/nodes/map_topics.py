@@ -30,9 +30,9 @@ from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake, are_gridded_alike
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import ServerInputs
 from rover_planner.ros.subscriptions import subscribe_to_map
+from rover_planner.shell.extras import find_type
 
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""
@@ -201,13 +201,14 @@ class MapCloud:
             self._publisher.withdraw()
         else:
             self._shown = known.fingerprint
-            self._work = self._pool.submit(self._publish, known)
+            publish = partial(self._publish_map, known)
+            self._work = self._pool.submit(self._node.guard.call, publish)
 
     def close(self) -> None:
         """End the thread."""
         self._pool.shutdown(cancel_futures=True)
 
-    def _publish(self, known: KnownMap) -> None:
+    def _publish_map(self, known: KnownMap) -> None:
         more: dict[str, np.ndarray] = {}
         if known.cells is not None:
             age = self._node.seconds - known.cells.time

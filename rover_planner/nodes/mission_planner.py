@@ -13,71 +13,48 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import rclpy
 from rclpy.exceptions import ParameterException
 
-from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.errors import DriveFailedError
+from rover_planner.errors import DriveFailedError, NoAnswerError, PlanningError
+from rover_planner.nodes.mission.client import NODE_NAME, Answer, MissionPlanner
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
-from rover_planner.nodes.mission.rover_link import RoverLink
-from rover_planner.nodes.mission.server_client import Answer, NoAnswerError, ServerClient
-from rover_planner.nodes.programs import MissionOptions, read_arguments
+from rover_planner.nodes.start import MissionOptions, read_arguments
 from rover_planner.ros.process import init_ros
 from rover_planner.shell.poses import Pose
 from rover_planner.shell.run_program import (
-    EXIT_BAD_INPUT,
     EXIT_FAILED,
     EXIT_INTERRUPTED,
-    EXIT_NO_ANSWER,
     EXIT_NOT_TRAVERSABLE,
     EXIT_OK,
-    end_with,
     run_program,
 )
 
-NODE_NAME = "mission_planner"
 OWN_OPTIONS = {"policy", "backward"}
 """Options of a remedy that a mission planner can see to: the server's torque policy, and the
 direction, which is that of the path. Arm and payload are others' work."""
 
 
-class MissionPlanner(ServerClient):
-    """A client of the server with a link to a rover."""
-
-    def __init__(self, map_frame: str = "map", timeout: float = 60.0, **node_arguments: Any):
-        super().__init__(NODE_NAME, map_frame, timeout, **node_arguments)
-        self.rover = RoverLink(self)
-        """The rover."""
-
-
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node and return its exit code; see `rover_planner.nodes.programs`."""
+    """Run the node and return its exit code; see `rover_planner.nodes.start`."""
     return run_program(NODE_NAME, lambda: _run(argv))
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    try:
-        options = read_arguments(NODE_NAME, argv)
-        if options == EXIT_OK:  # help was printed
-            return EXIT_OK
-        terrain = load_terrain(options.map_name) if options.map_name else None
-    except RoverError as error:
-        return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
+    options = read_arguments(NODE_NAME, argv)
+    if options == EXIT_OK:  # help was printed
+        return EXIT_OK
+    terrain = load_terrain(options.map_name) if options.map_name else None
     init_ros(argv)
     node = None
     try:
         node = MissionPlanner(options.map_frame, options.timeout)
         return _carry_out(node, terrain, options)
-    except NoAnswerError as error:
-        return end_with(NODE_NAME, EXIT_NO_ANSWER, str(error))
-    except DriveFailedError as error:
-        return end_with(NODE_NAME, EXIT_FAILED, str(error))
     except ParameterException as error:  # ROS has parameters of its own
-        return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
+        raise PlanningError(str(error)) from error
     except Exception:
         if rclpy.ok():
             raise
@@ -111,7 +88,7 @@ def _carry_out(planner: MissionPlanner, terrain: Terrain | None, options: Missio
         if options.drive and answer.traversable:
             tell("driving")
             settings = DriveSettings(options.position_tolerance, options.heading_tolerance)
-            drive = Drive(planner, planner.rover, goal, settings, tell)
+            drive = Drive(planner, goal, settings, tell)
             try:
                 start = drive.run(answer.poses).tolist()
             except NoAnswerError as error:
@@ -121,18 +98,18 @@ def _carry_out(planner: MissionPlanner, terrain: Terrain | None, options: Missio
 
 
 def _take_advice(
-    server: ServerClient, start: Sequence[float], goal: Pose, tell: Callable[..., None]
+    planner: MissionPlanner, start: Sequence[float], goal: Pose, tell: Callable[..., None]
 ) -> Answer | None:
     """Take the first remedy that needs nobody else; return the answer with it, None without."""
-    advice = server.ask_advice()
+    advice = planner.ask_advice()
     for remedy in advice["remedies"]:
         if remedy["needs_others"] or not set(remedy["options"]) <= OWN_OPTIONS:
             continue
         tell(f"advice: {remedy['words']}")
         if "policy" in remedy["options"]:
-            server.set_policy(remedy["options"]["policy"])
+            planner.set_policy(remedy["options"]["policy"])
         has_path = "poses" in remedy
-        answer = server.check(np.array(remedy["poses"])) if has_path else server.ask(start, goal)
+        answer = planner.check(np.array(remedy["poses"])) if has_path else planner.ask(start, goal)
         tell("answer", answer)
         return answer
     words = advice.get("words", advice["reason"])

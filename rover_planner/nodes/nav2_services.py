@@ -21,7 +21,7 @@ from rover_planner.planning.answering.judgement import IdentityReport, PathJudge
 from rover_planner.planning.answering.questions import Question
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import densify
-from rover_planner.ros.optional_types import find_type
+from rover_planner.shell.extras import find_type
 
 NO_PATH = "NO_VALID_PATH"
 ERRORS = {

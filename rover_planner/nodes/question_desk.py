@@ -30,7 +30,7 @@ from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.deferred import PacedSender, Reply, serve_later
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import TOPIC_QOS
 
 LEAVE_TIME = 0.1
 """Time in which the last answers leave before the node is destroyed [s]."""
@@ -86,7 +86,7 @@ class QuestionDesk:
         """Counts of answers and faults."""
         wake = partial(node.handover.call, self._deliver)
         self._queue = QuestionQueue(self._judge, wake, node.guard.report)
-        self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
+        self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", TOPIC_QOS)
         self._patrol = create_steady_timer(node, PATROL, self._refuse_overdue, starts=False)
 
     @property

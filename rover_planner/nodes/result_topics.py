@@ -14,7 +14,7 @@ from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.paths import decimate, settled_path
-from msg_adapters.results.diagnostics import verdict_to_diagnostics
+from msg_adapters.results.diagnostics import VERDICT, make_status, texts_of
 from msg_adapters.results.grids import NOT_REACHED, REACHED, occupancy_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import joint_trajectory, tip_over_array, wheel_array
@@ -56,10 +56,7 @@ class ResultTopics:
             judgement: The answer.
             identity: What it is about; without a path, that of the plan is added.
         """
-        values, site = self._node.values, judgement.site
-        rover = self._inputs.service.settings.rover if site is None else site.rover
-        header = Header(frame_id=values.map_frame, stamp=ns_to_stamp(self._next_stamp()))
-        results = ResultMessages(judgement, identity, header, rover, values, self._inputs)
+        results = ResultMessages(judgement, identity, self._next_stamp(), self._inputs)
         if judgement.traversable and not identity.path_hash:
             path_hash, path_stamp = describe_path(results.plan)
             results.identity = replace(identity, path_hash=path_hash, path_stamp=path_stamp)
@@ -101,14 +98,22 @@ class ResultMessages:
     """The judgement."""
     identity: IdentityReport
     """Question, map and path that it is about."""
-    header: Header
-    """Frame of the map, and stamp, of all messages."""
-    rover: Rover
-    """The rover of the question."""
-    values: TraverseServerParameters
-    """Parameters of the messages."""
+    stamp: int
+    """Time of all messages [ns]."""
     inputs: ServerInputs
-    """Know joints and frames of messages."""
+    """Know the rover, and joints and frames of messages."""
+
+    @cached_property
+    def header(self) -> Header:
+        """Frame of the map, and stamp, of all messages."""
+        frame = self.inputs.service.settings.parameters.map_frame
+        return Header(frame_id=frame, stamp=ns_to_stamp(self.stamp))
+
+    @property
+    def rover(self) -> Rover:
+        """The rover of the question."""
+        site = self.judgement.site
+        return self.inputs.service.settings.rover if site is None else site.rover
 
     @property
     def prediction(self) -> PathPrediction | None:
@@ -134,11 +139,12 @@ class ResultMessages:
     def verdict(self) -> DiagnosticArray:
         """Return the verdict and its summary."""
         judgement, report = self.judgement, self.report
-        level = "warning" if report.has_warning else "ok"
-        return verdict_to_diagnostics(
-            level if judgement.traversable else "error", judgement.reason, report.summary(),
-            self.rover.name, self.header,
-        )  # fmt: skip
+        level = "error"
+        if judgement.traversable:
+            level = "warning" if report.has_warning else "ok"
+        reason, entries = judgement.reason or "traversable", texts_of(report.summary())
+        status = make_status(VERDICT, level, reason, entries, self.rover.name)
+        return DiagnosticArray(header=self.header, status=[status])
 
     def closed_area(self) -> OccupancyGrid:
         """Return the area that start or goal are closed in; without places if they are not."""
@@ -168,9 +174,8 @@ class ResultMessages:
         """Return indices of waypoints about `plan_spacing` apart and where the class changes."""
         candidate = self.judgement.candidate
         assert candidate is not None
-        return decimate(
-            candidate.prediction.poses, self.values.plan_spacing, self.judgement.changes()
-        )
+        spacing = self.inputs.service.settings.parameters.plan_spacing
+        return decimate(candidate.prediction.poses, spacing, self.judgement.changes())
 
 
 Maker = Callable[[ResultMessages], object]

@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /rover_simulator: simulates a rover on a terrain with the topics of a real rover."""
 
-import json
 import sys
 import time
 from collections import deque
-from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
@@ -14,7 +12,6 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState, PointCloud2
@@ -26,21 +23,20 @@ from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
 from msg_adapters.joints import JointNames
 from msg_adapters.paths import path_to_poses
-from msg_adapters.results.diagnostics import SIMULATOR, make_status
-from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
+from msg_adapters.results.diagnostics import SIMULATOR, make_status, texts_of
+from msg_adapters.sensors import BASE_FRAME, imu_message, joint_state, odometry_message
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.maps.known_map import describe_terrain
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.warm_up import SIMULATION
+from rover_planner.nodes.warm_up import SIMULATION, load_kernels
 from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulatorParameters
 from rover_planner.parameters.shared import STOP
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
-from rover_planner.shell.kernels import load_kernels
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
+from rover_planner.shell.extras import find_type
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_ground
 
@@ -104,9 +100,9 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         qos = QoSProfile(depth=5)  # reliable, so that every subscriber hears it
         kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
         self._sensors = [self.create_publisher(kind, name, qos) for name, kind in kinds.items()]
-        self._driven = self.create_publisher(String, "path_driven", latched_qos())
-        self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
+        self._driven = self.create_publisher(String, "path_driven", LATCHED_QOS)
+        self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", TOPIC_QOS)
         self._clock_publisher = None
         if self.get_parameter("use_sim_time").value:
             self._clock_publisher = self.create_publisher(ClockMessage, "/clock", qos)
@@ -117,13 +113,13 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
-        qos, hear, rover = topic_qos(), self.heard.subscribe, self.simulation
+        qos, hear, rover = TOPIC_QOS, self.heard.subscribe, self.simulation
         hear(Bool, STOP, lambda one, arrival: rover.take_stop(one.data, arrival), qos)
         hear(Path, "path", self._take_path, qos)
-        hear(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
+        hear(TwistStamped, "cmd_vel", self._take_speeds, SENSOR_QOS)
         if self.values.follow_commands:
-            hear(Float64MultiArray, COMMANDS, self._take_torques, sensor_qos())
-            hear(Bool, BRAKE, lambda one, _: rover.take_brake(one.data), latched_qos())
+            hear(Float64MultiArray, COMMANDS, self._take_torques, SENSOR_QOS)
+            hear(Bool, BRAKE, lambda one, _: rover.take_brake(one.data), LATCHED_QOS)
 
     def _take_path(self, path: Path, _arrival: float) -> None:
         self.simulation.take_path(path_to_poses(path, self._frame))
@@ -207,17 +203,17 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
 
     def _publish_diagnostics(self) -> None:
         state, speeds = self._state, self.simulation.steering
-        said = {
+        values = {
             "position": np.round(state.position, 3).tolist(),
             "wanted_speed": round(speeds[0], 4),
             "wanted_yaw_rate": round(speeds[1], 4),
             "follows_path": self.simulation.follows_path,
         }
-        values = {key: json.dumps(value) for key, value in said.items()}
         level, text = (
             ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
-        status = make_status(SIMULATOR, level, text, values, self.simulation.rover.name)
+        name = self.simulation.rover.name
+        status = make_status(SIMULATOR, level, text, texts_of(values), name)
         header = Header(stamp=self._stamp)
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
@@ -259,14 +255,8 @@ def _transform(state: PlantState, frame_id: str, stamp: Any) -> TransformStamped
     return message
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-
-    def make(options: dict[str, Any]) -> RoverSimulator:
-        overrides = [Parameter(name, value=value) for name, value in options.items()]
-        return RoverSimulator(parameter_overrides=overrides)
-
-    return run_node(NODE_NAME, argv, make, SWITCH_INTERVAL)
+main = partial(run_node, NODE_NAME, RoverSimulator, SWITCH_INTERVAL)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

@@ -16,10 +16,11 @@ import rclpy
 import rclpy.logging
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from rover_physics.errors import RoverError
-from rover_planner.nodes.programs import read_arguments
+from rover_planner.nodes.start import read_arguments
 from rover_planner.ros.guard import GuardedExecutor
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.process import init_ros, take_priority, warn_of_disk
@@ -32,18 +33,18 @@ LOOK_FOR_STOP = 0.5
 
 def run_node(
     name: str,
-    argv: Sequence[str] | None,
-    make: Callable[[Any], RoverNode[Any]],
+    kind: Callable[..., RoverNode[Any]],
     switch_interval: float | None = None,
+    argv: Sequence[str] | None = None,
 ) -> int:
     """Run a node until it is stopped.
 
     Args:
         name: One of the PROGRAMS.
-        argv: Its arguments; None takes those of the process.
-        make: Returns the node for the values of its options; may raise RoverError.
+        kind: Its class.
         switch_interval: Longest time for which a thread may delay the executor's whenever that
             needs Python's lock [s]; None leaves Python's thread switch interval.
+        argv: Its arguments; None takes those of the process.
 
     Returns:
         2 for a wrong argument or parameter, else 0.
@@ -55,7 +56,8 @@ def run_node(
             return EXIT_OK
         init_ros(argv, signal_handler_options=SignalHandlerOptions.NO)
         executor = GuardedExecutor()
-        node = make(options)
+        given = [Parameter(one, value=value) for one, value in options.items()]
+        node = kind(parameter_overrides=given)
         _take_priority(node)
         stop.defer(executor.wake)
         warn_of_disk(node.get_logger())

@@ -3,30 +3,28 @@
 
 import sys
 import time
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Header
 from std_srvs.srv import SetBool
 
-from msg_adapters.commands import joint_order
-from msg_adapters.results.diagnostics import traction_diagnostics
-from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
+from msg_adapters.results.diagnostics import TORQUES, make_status
+from rover_physics.names import WHEEL_COUNT
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
-from rover_planner.nodes.traction.topics import TractionTopics
-from rover_planner.nodes.warm_up import TRACTION, update_traction
+from rover_planner.nodes.traction_topics import TractionInputs, TractionMaps, TractionTopics
+from rover_planner.nodes.warm_up import TRACTION, load_kernels, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.node import RoverNode, create_steady_timer
-from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
-from rover_planner.shell.kernels import load_kernels
-from rover_planner.traction.clocks import ClockWatch
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
+from rover_planner.traction.input_monitor import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
-from rover_planner.traction.statistics import TractionStatistics
+from rover_planner.traction.statistics import TractionStatistics, judge_update
 from rover_planner.traction.supervisor import TractionSupervisor
 from rover_planner.traction.traction_service import (
     DISABLED,
@@ -78,9 +76,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         """Knows where the frames of messages are on the map."""
         self._maps = TractionMaps(self, self.service, self.frames)
         self._inputs = TractionInputs(self, self.service, self._maps, self.frames)
-        names = self._inputs.joint_names
-        order = joint_order(values.joints, names)
-        self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
+        self._topics = TractionTopics(self, self.service, self._inputs.joint_names)
         self._create_switches()
         self._watchdog = Watchdog(lambda: self._topics.write(np.zeros(WHEEL_COUNT), True, FAULT))
         self.follow_changes(
@@ -126,7 +122,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         started, so there are three subscriptions; a stop may arrive three times.
         """
         self.create_service(SetBool, "~/enable", self._enable)
-        for qos in (topic_qos(), latched_qos(), sensor_qos()):
+        for qos in (TOPIC_QOS, LATCHED_QOS, SENSOR_QOS):
             self.heard.subscribe(Bool, "~/emergency_stop", self._take_emergency_stop, qos)
 
     def _apply_settings(self, settings: TractionSettings) -> None:
@@ -167,26 +163,14 @@ class TractionController(RoverNode[TractionControllerParameters]):
             now = time.monotonic()
         command = repeated or self._find_command(now)
         sent = self._watchdog.send(
-            lambda: self._write(command), now, self._find_deadline(now, command)
+            lambda: self._topics.send(command), now, self._find_deadline(now, command)
         )
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)
-            self._write(command)  # torques of a sending that hung are not the last ones
+            self._topics.send(command)  # torques of a sending that hung are not the last ones
         self._topics.publish_forces(command)
         self.statistics.take(command, start, time.perf_counter())
         self._log_changes(command, now)
-
-    def _write(self, command: TractionCommand) -> None:
-        """Publish torques, and rates and steering angles for drives that hold those."""
-        topics, service = self._topics, self.service
-        if command.state != DRIVING:
-            topics.write(command.torques, command.brake, command.state)
-            return
-        topics.write(command.torques, command.brake, command.state, service.wanted_rates)
-        if topics.steering.get_subscription_count():
-            angles = service.course.steering_aims(service.wanted)
-            if angles is not None:
-                topics.publish_steering(self._inputs.to_robot_steering(angles))
 
     def _find_repeated(self, now: float) -> TractionCommand | None:
         """Return the last command if this update is to send it again, else None."""
@@ -253,23 +237,23 @@ class TractionController(RoverNode[TractionControllerParameters]):
         command = self._command
         if command is None:
             return
-        values = self.statistics.describe() | {
+        problems = [*self._inputs.publishers.problems, *filter(None, [command.warning])]
+        values = {
+            "state": command.state,
+            **self.statistics.describe(),
             "watchdog_trips": self._watchdog.trips,
             "internal_errors": self.guard.total,
             "brake": command.brake,
+            "warning": "; ".join(problems),
         }
-        name, stamp = self.service.settings.rover.name, self.get_clock().now().to_msg()
-        self._topics.diagnostics.publish(
-            traction_diagnostics(
-                values, command.state, command.fault,
-                self._inputs.publishers.problems, name, stamp,
-            )
-        )  # fmt: skip
+        level, text = judge_update(command, problems)
+        status = make_status(TORQUES, level, text, values, self.service.settings.rover.name)
+        header = Header(stamp=self.get_clock().now().to_msg())
+        self._topics.diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    return run_node(NODE_NAME, argv, lambda _: TractionController(), SWITCH_INTERVAL)
+main = partial(run_node, NODE_NAME, TractionController, SWITCH_INTERVAL)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 
 import sys
 import time
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -32,7 +32,7 @@ from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, Path
 from rover_planner.nodes.question_desk import Answer, QuestionDesk
 from rover_planner.nodes.result_topics import ResultMessages, ResultTopics
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
+from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH, load_kernels
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement
@@ -50,15 +50,14 @@ from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import (
+    NEWEST_QOS,
+    RESULT_QOS,
+    TOPIC_QOS,
     joints_qos,
-    newest_qos,
-    replace_reliability,
-    result_qos,
-    topic_qos,
+    make_qos,
 )
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
 from rover_planner.ros.subscriptions import subscribe_to_requests
-from rover_planner.shell.kernels import load_kernels
 
 NODE_NAME = "traverse_server"
 SWITCH_INTERVAL = 1e-3
@@ -106,7 +105,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
         self._hazards = HazardTopics(self, self.service, self.desk.give_way)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
+        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", TOPIC_QOS)
         self._diagnostics_due = 0.0
         self._beats = create_steady_timer(self, PERIOD, self._beat)
         self.follow_changes(load_service_settings, self._apply_settings)
@@ -127,19 +126,19 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         hear, inputs = self.heard.subscribe, self._inputs
         joints = joints_qos(IDLE_PERIOD)
         hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), joints)
-        hear(Odometry, "odometry", self._take_odometry, newest_qos())
+        hear(Odometry, "odometry", self._take_odometry, NEWEST_QOS)
         if self.values.imu_attitude:
-            hear(Imu, "imu", lambda one, _: inputs.take_imu(one), newest_qos())
+            hear(Imu, "imu", lambda one, _: inputs.take_imu(one), NEWEST_QOS)
         reliability = self.values.input_reliability
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
-        qos = replace_reliability(topic_qos(), reliability)
+        qos = make_qos(10, reliability)
         hear(String, "~/ground_estimate", self._take_ground, qos)
         self.create_subscription(String, "~/mark_place", self._take_mark, qos)
         # Only a transient-local one hears of places that were marked before a restart. It does not
         # warn of publishers that the other one hears.
         quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
         self.create_subscription(
-            String, "~/mark_place", self._take_mark, result_qos(), event_callbacks=quiet
+            String, "~/mark_place", self._take_mark, RESULT_QOS, event_callbacks=quiet
         )
 
     def _log_ready(self) -> None:
@@ -339,9 +338,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._diagnostics.publish(DiagnosticArray(header=header, status=statuses))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    return run_node(NODE_NAME, argv, lambda _: TraverseServer(), SWITCH_INTERVAL)
+main = partial(run_node, NODE_NAME, TraverseServer, SWITCH_INTERVAL)
+"""Runs the node until it is stopped; returns 2 for a wrong argument or parameter, else 0."""
 
 
 if __name__ == "__main__":

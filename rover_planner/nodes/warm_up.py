@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kernels of the nodes beyond those of rover_physics, and the groups of all kernels."""
 
+import itertools
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
+from rover_physics.bounds.path import is_uncertain
+from rover_physics.compilation import NICENESS, Compilation, Step
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
-from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_physics.warm_up import EXACT, UNCERTAIN, bound_poses
 from rover_planner.learning.drive_log import FORCES, TIME, WIDTH
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.search.difficulty import estimate_difficulty
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.graph import Seeds, ShortestPaths
-from rover_planner.planning.search.ground_estimate import estimate_ground
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.primitives import make_primitives
@@ -42,12 +46,19 @@ def search_paths() -> None:
         find_path(SearchQuery(site, *ends), LatticeSettings(budget=60.0, cell=0.4))
 
 
+def prepare_search(site: Site) -> None:
+    """Load all kernels that a search at a site needs, so that its budget is not spent on it."""
+    search_paths()
+    if is_uncertain(site.terrain, site.options.map_sigmas):
+        bound_poses()
+
+
 def search_lattice() -> None:
     """Search a path over a lattice of which nothing is known, without the model of a pose."""
     rover, ground = load_rover("lsr1"), Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
     nodes = nodes_within(0.2, (1.0, 1.0), (2.0, 2.0))
     edges = Edges(nodes, make_primitives(rover, nodes.cell, 0.1))
-    doubt = estimate_ground(rover, ground, nodes).doubt
+    doubt = np.zeros(nodes.count, np.float32)
     difficulty = estimate_difficulty(rover, ground, nodes, 0.5, edges.primitives)
     start, goal = (Seeds(np.array([node]), np.zeros(1)) for node in (0, nodes.count - 1))
     search = ShortestPaths(edges, doubt, difficulty, start)
@@ -120,3 +131,39 @@ GROUPS = (
 )
 """All kernels. The first group compiles the model of a pose once for all that use it, which takes
 two thirds of the time; the second has what needs no such model."""
+
+
+LOADING_DELAY = 1.0
+"""Time that a program has to itself before it loads what it needs later [s]."""
+
+
+def load_kernels(
+    first: Sequence[Step], behind: Sequence[Step], report: Callable[[str], object]
+) -> Compilation:
+    """Load kernels, and begin to load others while the program works.
+
+    Args:
+        first: What is needed at once: this function returns when it is loaded.
+        behind: What is needed later. If `first` must be compiled, it is compiled meanwhile.
+        report: Function that takes a line on each thing that is compiled, which takes seconds.
+
+    Returns:
+        What loads the others; to be closed when the program ends.
+    """
+    background, count = Compilation(behind, NICENESS), itertools.count(1)
+
+    def tell_behind(name: str) -> None:
+        report(f"compiling besides: {name}")
+
+    def tell_first(name: str) -> None:
+        background.start(tell_behind)
+        report(f"compiling kernels {next(count)} of {len(first)}: {name}")
+
+    try:
+        with Compilation(first) as compilation:
+            compilation.run(tell_first)
+    except BaseException:  # such as KeyboardInterrupt
+        background.close()
+        raise
+    background.start(tell_behind, LOADING_DELAY)
+    return background

@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.node import create_steady_timer
-from rover_planner.ros.qos import service_qos
+from rover_planner.ros.qos import SERVICE_QOS
 
 AT_ONCE = 5
 """Largest number of responses in a group."""
@@ -37,7 +37,7 @@ def serve_later(
     def hand_on(request: Any, response: Any) -> tuple[Any, Any]:
         return request, response
 
-    service = node.create_service(kind, name, hand_on, qos_profile=service_qos())
+    service = node.create_service(kind, name, hand_on, qos_profile=SERVICE_QOS)
     send_response = service.send_response
 
     def receive(exchange: tuple[Any, Any], header: Any) -> None:

@@ -13,15 +13,19 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame, check_transform
-from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, pose_to_array
+from msg_adapters.sensors import odometry_to_pose
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.sensor_mounts import read_mounts
-from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
-from rover_planner.ros.optional_types import find_type
+from rover_planner.planning.navigation.transforms import (
+    Rigid,
+    TransformError,
+    TransformTree,
+    read_mounts,
+)
+from rover_planner.shell.extras import find_type
 
 TF_DEPTH = 100
 """Messages of /tf that wait to be taken, as in tf2."""

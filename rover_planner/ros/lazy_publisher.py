@@ -9,7 +9,7 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from rover_planner.ros.qos import latched_qos
+from rover_planner.ros.qos import LATCHED_QOS
 
 
 class LazyPublisher:
@@ -26,7 +26,7 @@ class LazyPublisher:
         silent = PublisherEventCallbacks(use_default_callbacks=False)
         self._node = node
         self._create = partial(
-            node.create_publisher, kind, name, latched_qos(), event_callbacks=silent
+            node.create_publisher, kind, name, LATCHED_QOS, event_callbacks=silent
         )
         self._publisher: Publisher = self._create()
         self._make: Callable[[], Any] | None = None

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node that each node program is: its parameters, what it hears, and what keeps it alive."""
 
-from collections.abc import Callable
+import difflib
+from array import array
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Generic, TypeVar
 
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -14,11 +21,13 @@ from rclpy.timer import Timer
 
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
-from rover_planner.parameters.declare import declare_parameters, values_in
-from rover_planner.parameters.table import ParameterError, ParameterTable, specs_of
+from rover_planner.parameters.table import ParameterError, ParameterSpec, ParameterTable, specs_of
 from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.shell.run_program import one_line
+
+ROS_OWN = ("qos_overrides.",)
+"""Begins of names of parameters that ROS declares by itself."""
 
 Table = TypeVar("Table", bound=ParameterTable)
 
@@ -88,6 +97,68 @@ class RoverNode(Node, Generic[Table]):
 
         self.add_on_set_parameters_callback(check)
         self.add_post_set_parameters_callback(pass_on)
+
+
+def declare_parameters(node: Node, table: type[Table]) -> Table:
+    """Declare the parameters of a table with their descriptors; return a table of their values.
+
+    Parameters that were set and do not exist get a warning in the log.
+
+    Raises:
+        ParameterError: An override is not allowed by the table, which says so in its own words.
+    """
+    specs, given = specs_of(table), node._parameter_overrides  # rclpy has no public access
+    # ROS takes [] for an override without a value.
+    values = values_in(table, given.values())
+    empty = [name for name in values if given[name].type_ == Parameter.Type.NOT_SET]
+    table(**values | dict.fromkeys(empty, ()))
+    for spec in specs:
+        if spec.name in empty:
+            raise ParameterError(
+                f"parameter {spec.name} is [], which has no type in ROS; leave it out, its "
+                f"default is {spec.ros_default}"
+            )
+    rows = [(spec.name, spec.ros_default, _descriptor(spec)) for spec in specs]
+    found = node.declare_parameters("", rows)
+    for name in sorted(given):
+        if not node.has_parameter(name) and not name.startswith(ROS_OWN):
+            nearest = difflib.get_close_matches(name, [spec.name for spec in specs], n=1)
+            hint = f"the nearest is {nearest[0]}" if nearest else "--help lists those there are"
+            node.get_logger().warning(f"parameter {name} does not exist and is ignored; {hint}")
+    return table(**values_in(table, found))
+
+
+def values_in(table: type[ParameterTable], parameters: Iterable[Parameter]) -> dict[str, Any]:
+    """Return the values of the parameters in a table by name; lists become tuples."""
+    names = {spec.name for spec in specs_of(table)}
+    return {
+        parameter.name: (
+            tuple(parameter.value)
+            if isinstance(parameter.value, list | array)
+            else parameter.value
+        )
+        for parameter in parameters
+        if parameter.name in names
+    }
+
+
+def _descriptor(spec: ParameterSpec) -> ParameterDescriptor:
+    """Return the descriptor that ROS tools show."""
+    unit = f" [{spec.unit}]" if spec.unit else ""
+    descriptor = ParameterDescriptor(
+        name=spec.name, description=spec.meaning + unit, read_only=spec.read_only
+    )
+    if spec.choices:
+        descriptor.additional_constraints = "one of " + ", ".join(spec.choices)
+    if spec.bounds is not None and not isinstance(spec.default, int):
+        descriptor.floating_point_range = [
+            FloatingPointRange(from_value=spec.bounds[0], to_value=spec.bounds[1])
+        ]
+    elif spec.bounds is not None:
+        descriptor.integer_range = [
+            IntegerRange(from_value=int(spec.bounds[0]), to_value=int(spec.bounds[1]))
+        ]
+    return descriptor
 
 
 def create_steady_timer(

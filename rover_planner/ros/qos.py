@@ -19,34 +19,29 @@ HEAR_VOLATILE = {QoSPolicyKind.DURABILITY: f"set map_durability to {EITHER} or {
 """Advice about volatile publishers of what is subscribed to as transient local."""
 
 
-def topic_qos() -> QoSProfile:
-    """Return the profile of ordinary topics: reliable, depth 10."""
-    return QoSProfile(depth=10)
+def make_qos(depth: int, reliability: str = RELIABLE, durability: str = VOLATILE) -> QoSProfile:
+    """Return a profile; its policies are named as in the parameters."""
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy[reliability.upper()],
+        durability=DurabilityPolicy[durability.upper()],
+    )
 
 
-def result_qos() -> QoSProfile:
-    """Return the profile of results: reliable and transient local, for late subscribers."""
-    return QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-def map_qos(durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> QoSProfile:
-    """Return the profile of maps: reliable, depth 1."""
-    return QoSProfile(depth=1, durability=durability)
-
-
-def latched_qos() -> QoSProfile:
-    """Return the profile of states: late subscribers get the last one."""
-    return map_qos()
-
-
-def sensor_qos() -> QoSProfile:
-    """Return the profile of sensor data: best effort, which matches every publisher."""
-    return QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-def polled_qos() -> QoSProfile:
-    """Return the profile of sensor data at up to 200 Hz that is read ten times a second."""
-    return QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
+TOPIC_QOS = make_qos(10)
+"""Ordinary topics."""
+RESULT_QOS = make_qos(10, durability=TRANSIENT_LOCAL)
+"""Results: late subscribers get them, too."""
+LATCHED_QOS = make_qos(1, durability=TRANSIENT_LOCAL)
+"""Maps and states: late subscribers get the last one."""
+SENSOR_QOS = make_qos(5, BEST_EFFORT)
+"""Sensor data; best effort matches every publisher."""
+POLLED_QOS = make_qos(20, BEST_EFFORT)
+"""Sensor data at up to 200 Hz that is read ten times a second."""
+NEWEST_QOS = make_qos(1, BEST_EFFORT)
+"""Sensor data of which only the last message matters."""
+SERVICE_QOS = make_qos(100)
+"""Services that many clients may call at once."""
 
 
 def joints_qos(period: float) -> QoSProfile:
@@ -54,26 +49,7 @@ def joints_qos(period: float) -> QoSProfile:
 
     Several publishers share the topic: a fast one may not push out what a slow one has sent.
     """
-    return QoSProfile(depth=round(1000.0 * period), reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-def newest_qos() -> QoSProfile:
-    """Return the profile of sensor data of which only the last message matters."""
-    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-def service_qos() -> QoSProfile:
-    """Return the profile of services that many clients may call at once."""
-    return QoSProfile(depth=100)
-
-
-def replace_reliability(profile: QoSProfile, reliability: str) -> QoSProfile:
-    """Set the reliability of a profile, one of `RELIABILITIES`, and return the profile."""
-    best_effort = reliability == BEST_EFFORT
-    profile.reliability = (
-        ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
-    )
-    return profile
+    return make_qos(round(1000.0 * period), BEST_EFFORT)
 
 
 def map_subscriptions(
@@ -92,11 +68,10 @@ def map_subscriptions(
     Returns:
         Per subscription its profile, and what to do about publishers that it does not match.
     """
-    transient_local, volatile = map_qos(), map_qos(DurabilityPolicy.VOLATILE)
     chosen = {
         # With both kinds, only the volatile one tells: it misses what neither hears.
-        EITHER: [(transient_local, {}), (volatile, HEAR_BEST_EFFORT)],
-        TRANSIENT_LOCAL: [(transient_local, HEAR_BEST_EFFORT | HEAR_VOLATILE)],
-        VOLATILE: [(volatile, HEAR_BEST_EFFORT)],
+        EITHER: [(TRANSIENT_LOCAL, {}), (VOLATILE, HEAR_BEST_EFFORT)],
+        TRANSIENT_LOCAL: [(TRANSIENT_LOCAL, HEAR_BEST_EFFORT | HEAR_VOLATILE)],
+        VOLATILE: [(VOLATILE, HEAR_BEST_EFFORT)],
     }[durability]
-    return [(replace_reliability(profile, reliability), mends) for profile, mends in chosen]
+    return [(make_qos(1, reliability, kind), mends) for kind, mends in chosen]

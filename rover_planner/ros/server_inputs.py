@@ -11,9 +11,8 @@ from sensor_msgs.msg import JointState
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
-from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
-from msg_adapters.sensing import BASE_FRAME
+from msg_adapters.sensors import BASE_FRAME, ImuMounting, imu_to_attitude
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats

@@ -14,10 +14,10 @@ from rclpy.subscription import Subscription
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import (
     HEAR_BEST_EFFORT,
+    make_qos,
     map_subscriptions,
-    replace_reliability,
-    topic_qos,
 )
+from rover_planner.shell.extras import name_type
 
 PERIOD = 5.0
 """Time between two looks at the types of publishers [s]; one takes a millisecond per topic."""
@@ -42,7 +42,7 @@ def subscribe_to_requests(
         reliability: One of `RELIABILITIES`.
         raw: Whether `take` gets the bytes of a message.
     """
-    qos = replace_reliability(topic_qos(), reliability)
+    qos = make_qos(10, reliability)
     _subscribe(node, kind, name, take, qos, HEAR_BEST_EFFORT, raw=raw)
 
 
@@ -118,15 +118,17 @@ def _subscribe(
 class PublisherCheck:
     """Looks for publishers of other types each PERIOD; each problem is logged once."""
 
-    def __init__(self, node: Node, types: Mapping[str, str], advice: Mapping[str, str]):
+    def __init__(self, node: Node, kinds: Mapping[str, type], mends: Mapping[type, str]):
         """Check topics of a node.
 
         Args:
             node: The node.
-            types: Type of the messages of each topic, such as geometry_msgs/msg/Twist.
-            advice: What to do about publishers of other types, by type.
+            kinds: Type of the messages of each topic.
+            mends: What to do about publishers of other types, by type.
         """
-        self._node, self._types, self._advice = node, types, advice
+        self._node = node
+        self._types = {topic: name_type(kind) for topic, kind in kinds.items()}
+        self._mends = {name_type(kind): mend for kind, mend in mends.items()}
         self.problems: tuple[str, ...] = ()
         """The problems found last."""
         create_steady_timer(node, PERIOD, self._check)
@@ -148,6 +150,6 @@ class PublisherCheck:
             if kind == wanted:
                 continue
             name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
-            advice = self._advice.get(kind, f"it must be {wanted}")
-            found.append(f"{topic} of {name} is not heard: its type is {kind}; {advice}")
+            mend = self._mends.get(kind, f"it must be {wanted}")
+            found.append(f"{topic} of {name} is not heard: its type is {kind}; {mend}")
         return list(dict.fromkeys(found))

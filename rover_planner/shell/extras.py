@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks for optional libraries, which only some commands need."""
+"""Optional libraries, which only some commands need, and types that a robot may lack."""
 
 import importlib.util
 import platform
+from functools import cache
 
 from rover_planner.errors import PlanningError
 
@@ -44,3 +45,19 @@ def explain_import(error: ImportError, what: str) -> str:
         f"{error.name or 'a library of ROS'} ({error}). ROS from apt needs the system's Python "
         "or an environment made with --system-site-packages"
     )
+
+
+@cache
+def find_type(name: str) -> type | None:
+    """Return a type such as grid_map_msgs.msg:GridMap; None where its package is missing."""
+    module, _, kind = name.partition(":")
+    try:
+        found: type = getattr(importlib.import_module(module), kind)
+    except ImportError:
+        return None
+    return found
+
+
+def name_type(kind: type) -> str:
+    """Return the name of a type of messages in ROS, such as geometry_msgs/msg/Twist."""
+    return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"

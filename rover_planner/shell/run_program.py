@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Any
 
 from rover_physics.errors import RoverError
-from rover_planner.errors import DemoError
+from rover_planner.errors import FailedError
 
 EXIT_OK = 0
 """The program ran, with any verdict of the model."""
@@ -23,8 +23,6 @@ EXIT_BAD_INPUT = 2
 """The input is invalid or a library is missing; one line on stderr names it."""
 EXIT_NOT_TRAVERSABLE = 3
 """mission_planner only: all queries were answered, and at least one goal is not traversable."""
-EXIT_NO_ANSWER = 4
-"""mission_planner only: no server, or no answer in time."""
 EXIT_PIPE_CLOSED = 141
 """Nobody reads the output any more, as in `rover_planner ... | head`: 128 + SIGPIPE."""
 EXIT_INTERRUPTED = 130
@@ -56,8 +54,8 @@ def run_program(name: str, run: Callable[[], Any]) -> int:
             sys.stdout.flush()
     except RoverError as error:
         return end_with(name, EXIT_BAD_INPUT, str(error))
-    except DemoError as error:
-        return end_with(name, EXIT_FAILED, str(error))
+    except FailedError as error:
+        return end_with(name, error.exit_code, str(error))
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
     except BrokenPipeError:

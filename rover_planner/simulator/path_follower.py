@@ -35,7 +35,6 @@ MAX_TRIES = 3
 """Attempts at one place."""
 NEW_PLACE = 3.0
 """Distance along the path [wheel radii] after which the attempts are counted anew."""
-NO_PLACE = (math.inf, math.inf)
 
 
 class PathFollower:
@@ -56,57 +55,37 @@ class PathFollower:
         self._legs = _find_legs(np.asarray(poses, dtype=float))
         self._look_ahead = look_ahead
         self._outermost = look_ahead if outermost is None else outermost
-        self._at, self._finished = 0, 0.0
+        self._finished = 0.0
 
     @property
     def driven(self) -> float:
         """Distance driven along the path [m]."""
-        return self._finished + self._leg.done
-
-    @property
-    def _leg(self) -> "_Leg":
-        return self._legs[self._at]
-
-    @property
-    def _is_last(self) -> bool:
-        return self._at == len(self._legs) - 1
+        return self._finished + self._legs[0].done
 
     def has_arrived(self, pose: Floats) -> bool:
         """Return whether a pose (3,) is at the end of the path."""
-        return self._is_last and self._is_done(pose)
+        left = ARRIVED * self._look_ahead
+        return len(self._legs) == 1 and self._legs[0].is_done(pose, left)
 
     def steer(self, pose: Floats, speed: float) -> tuple[float, float]:
         """Return speed [m/s] and yaw rate [rad/s] at a pose (3,); zeros at the end."""
-        self._leg.project(pose, self._look_ahead)
-        while not self._is_last and self._is_done(pose):
-            self._finished += self._leg.length
-            self._at += 1
-            self._leg.project(pose, self._look_ahead)
+        self._legs[0].project(pose, self._look_ahead)
+        while len(self._legs) > 1 and self._legs[0].is_done(pose, 1e-6):
+            self._finished += self._legs.pop(0).length
+            self._legs[0].project(pose, self._look_ahead)
+        leg = self._legs[0]
         if self.has_arrived(pose):
             return 0.0, 0.0
-        if self._leg.is_turn:
-            return 0.0, self._turn(pose, speed)
-        target = self._leg.at(self._leg.done + self._look_ahead)
-        ahead, gear = target - pose[:2], self._leg.gear
+        if leg.is_turn:
+            left = leg.left_to_turn(pose)
+            share = min(max(abs(left) / SLOW_ANGLE, MIN_TURN_SHARE), 1.0)
+            return 0.0, math.copysign(share * speed / self._outermost, left)
+        ahead = leg.at(leg.done + self._look_ahead) - pose[:2]
         # Backwards, the rover is steered as one that heads the other way.
-        across = gear * (-np.sin(pose[2]) * ahead[0] + np.cos(pose[2]) * ahead[1])
+        across = leg.gear * (-np.sin(pose[2]) * ahead[0] + np.cos(pose[2]) * ahead[1])
         curvature = 2.0 * across / max(float(ahead @ ahead), 1e-6)
         most = 1.0 / self._look_ahead
-        return gear * speed, speed * float(np.clip(curvature, -most, most))
-
-    def _is_done(self, pose: Floats) -> bool:
-        """Return whether a pose is at the end of the current leg."""
-        leg = self._leg
-        if leg.is_turn:
-            return abs(leg.left_to_turn(pose)) <= ALIGNED
-        left = ARRIVED * self._look_ahead if self._is_last else 1e-6
-        return leg.done >= leg.length - left
-
-    def _turn(self, pose: Floats, speed: float) -> float:
-        """Return the yaw rate [rad/s] of a turn on the spot."""
-        left = self._leg.left_to_turn(pose)
-        share = min(max(abs(left) / SLOW_ANGLE, MIN_TURN_SHARE), 1.0)
-        return math.copysign(share * speed / self._outermost, left)
+        return leg.gear * speed, speed * float(np.clip(curvature, -most, most))
 
 
 class _Leg:
@@ -121,6 +100,12 @@ class _Leg:
         self.length = 0.0 if self.is_turn else float(self._along[-1])
         self.done = 0.0
         self._seen = float(self._yaw[0])
+
+    def is_done(self, pose: Floats, left: float) -> bool:
+        """Return whether a pose is at the end of the leg, of a stretch up to `left` [m]."""
+        if self.is_turn:
+            return abs(self.left_to_turn(pose)) <= ALIGNED
+        return self.done >= self.length - left
 
     def left_to_turn(self, pose: Floats) -> float:
         """Return the turn [rad] that is left, positive to the left; of large turns, too."""
@@ -186,9 +171,11 @@ class SecondTry:
         """
         self._follower, self._radius = follower, radius
         self._max_tries, self._patience = max_tries, patience
-        self._place, self._yaw, self._since = NO_PLACE, 0.0, 0.0
+        self._seen, self._since = (math.inf, math.inf, 0.0), 0.0
+        """Pose and time of the last progress."""
         self._tries, self._counted_from = 1, 0.0
-        self._back_from, self._back_until = NO_PLACE, -math.inf
+        self._back_from, self._back_until = self._seen, -math.inf
+        """Pose from which the rover backs off, and the time up to which it does [s]."""
         self.retries = 0
         """Number of times that the rover has backed off."""
 
@@ -206,47 +193,22 @@ class SecondTry:
 
         Zeros at the end of the path and after the last attempt.
         """
-        wanted = self._follower.steer(pose, speed)
-        if self._backs_off(pose, now):
+        wanted, radius = self._follower.steer(pose, speed), self._radius
+        x, y, yaw = (float(value) for value in pose)
+        backs_off = now < self._back_until
+        if backs_off and math.dist((x, y), self._back_from[:2]) < BACK_DISTANCE * radius:
             return -speed, 0.0
-        self._note_progress(pose, now)
-        if any(wanted) and now - self._since > self._patience:
-            self._try_again(pose, speed, now)
-        return (0.0, 0.0) if self.given_up else wanted
-
-    def _try_again(self, pose: Floats, speed: float, now: float) -> None:
-        """Begin to back off at a speed [m/s], unless this was the last attempt."""
-        self._tries += 1
-        self._since = now
-        if self._tries <= self._max_tries:
-            self.retries += 1
-            needed = BACK_DISTANCE * self._radius / speed
-            self._back_from = _place_of(pose)
-            self._back_until = now + max(BACK_TIME, BACK_DELAY * needed)
-
-    def _backs_off(self, pose: Floats, now: float) -> bool:
-        """Return whether the rover still backs off; at the end, count its time anew."""
-        if now >= self._back_until:
-            return False
-        if math.dist(_place_of(pose), self._back_from) < BACK_DISTANCE * self._radius:
-            return True
-        self._back_until = -math.inf
-        self._note(pose, now)
-        return False
-
-    def _note(self, pose: Floats, now: float) -> None:
-        """Note a pose and its time [s] as progress."""
-        self._place, self._yaw, self._since = _place_of(pose), float(pose[2]), now
-
-    def _note_progress(self, pose: Floats, now: float) -> None:
-        """Note where the rover is if it has moved or turned."""
-        turned = abs(math.remainder(float(pose[2]) - self._yaw, 2.0 * math.pi))
-        moved = math.dist(_place_of(pose), self._place)
-        if moved > PROGRESS * self._radius or turned > TURN_PROGRESS:
-            self._note(pose, now)
-        if self._follower.driven > self._counted_from + NEW_PLACE * self._radius:
+        moved = math.dist((x, y), self._seen[:2]) > PROGRESS * radius
+        turned = abs(math.remainder(yaw - self._seen[2], 2.0 * math.pi)) > TURN_PROGRESS
+        if backs_off or moved or turned:
+            self._seen, self._since, self._back_until = (x, y, yaw), now, -math.inf
+        if self._follower.driven > self._counted_from + NEW_PLACE * radius:
             self._counted_from, self._tries = self._follower.driven, 1
-
-
-def _place_of(pose: Floats) -> tuple[float, float]:
-    return float(pose[0]), float(pose[1])
+        if any(wanted) and now - self._since > self._patience:
+            self._tries, self._since = self._tries + 1, now
+            if self._tries <= self._max_tries:
+                self.retries += 1
+                needed = BACK_DISTANCE * radius / speed
+                self._back_from = x, y, yaw
+                self._back_until = now + max(BACK_TIME, BACK_DELAY * needed)
+        return (0.0, 0.0) if self.given_up else wanted

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import check_bounds, is_uncertain
-from rover_physics.terrain.grid import Terrain, fingerprint, load_terrain
+from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
@@ -78,7 +78,7 @@ def prepare_survey(
         if is_uncertain(terrain, request.sigmas):
             check_bounds(terrain, request.options)
         frame = MapFrame(terrain.elevation.shape, terrain.resolution, terrain.origin, "")
-        map_file, content = "", fingerprint(terrain)
+        map_file, content = "", terrain.fingerprint
     notes = _make_notes(request, frame, map_file, content, chunk)
     if not out.exists():
         if settings is not None:
@@ -94,7 +94,10 @@ def prepare_survey(
 
 
 def summarise(store: SurveyStore) -> dict[str, Any]:
-    """Return the number of surveyed cells and their shares by best and worst class."""
+    """Return the number of surveyed cells and their shares by best and worst class.
+
+    Where the file of a layer is lost, its shares are those of the cells that it has.
+    """
     counts = {name: np.zeros(256, np.int64) for name in ("best_class", "worst_class")}
     for name, count in counts.items():
         layer = store.layer(name)
@@ -104,7 +107,7 @@ def summarise(store: SurveyStore) -> dict[str, Any]:
     surveyed = cells - int(counts["best_class"][NOT_SURVEYED])
     shares = {
         name: {
-            which: round(int(count[number]) / max(surveyed, 1), 6)
+            which: round(int(count[number]) / max(cells - int(count[NOT_SURVEYED]), 1), 6)
             for number, which in enumerate(TRAVERSABILITY_CLASSES)
         }
         for name, count in counts.items()

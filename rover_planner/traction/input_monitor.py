@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Monitors inputs: whether each is available, recent and valid.
+"""Ages, faults and stamps of the inputs of traction control, and the clock of the stamps.
 
 Frozen, delayed and future stamps must not pass as recent measurements.
 """
@@ -29,11 +29,10 @@ class InputRecord:
     error: str = ""
     error_time: float = NEVER
     ignored: str = ""
-    detail: str = ""
 
-    def describe(self) -> str:
+    def describe(self, detail: str) -> str:
         """Return why nothing recent was used, in brackets; empty if that is not known."""
-        text = "; ".join(filter(None, (self.detail, self.ignored)))
+        text = "; ".join(filter(None, (detail, self.ignored)))
         return f" ({text})" if text else ""
 
 
@@ -89,7 +88,7 @@ class InputMonitor:
         """Record a valid input that was measured at a time [s]."""
         record = self._inputs[name]
         record.time = max(time, record.time)
-        record.ignored = record.detail = ""
+        record.ignored = ""
         if time >= record.error_time:
             record.error = ""
 
@@ -101,10 +100,6 @@ class InputMonitor:
     def ignore(self, name: str, reason: str) -> None:
         """Record why a message was not used; the reason is shown when the input is stale."""
         self._inputs[name].ignored = reason
-
-    def describe(self, name: str, detail: str) -> None:
-        """Take what is known about a stale input, such as which part of it is missing."""
-        self._inputs[name].detail = detail
 
     def forget(self) -> None:
         """Forget times and stamps of all inputs: each must arrive anew."""
@@ -122,21 +117,24 @@ class InputMonitor:
         needed = self._find_needed()
         return min(record.time + self.timeouts[name] for name, record in needed.items())
 
-    def find_fault(self, now: float) -> str:
+    def find_fault(self, now: float, details: Mapping[str, str] | None = None) -> str:
         """Return the fault of the needed inputs at time `now` [s]; empty if there is none.
 
-        The text of a fault does not change with time.
+        The text of a fault does not change with time. `details` tell what is known about a stale
+        input, by name, such as which part of it is missing.
         """
+        details = details or {}
         needed = self._find_needed()
         missing = {n: one for n, one in needed.items() if one.time == NEVER and not one.error}
         if missing:
-            reasons = "".join(record.describe() for record in missing.values())
+            reasons = "".join(one.describe(details.get(n, "")) for n, one in missing.items())
             return f"waiting for {', '.join(missing)}{reasons}"
         errors = [record.error for record in needed.values() if record.error]
         return "; ".join(
             errors
             or [
-                f"{name} stale: none for {1e3 * self.timeouts[name]:.0f} ms{record.describe()}"
+                f"{name} stale: none for {1e3 * self.timeouts[name]:.0f} ms"
+                f"{record.describe(details.get(name, ''))}"
                 for name, record in needed.items()
                 if not self.is_fresh(name, now)
             ]
@@ -145,3 +143,49 @@ class InputMonitor:
     def _find_needed(self) -> dict[str, InputRecord]:
         needed = {n: self._inputs[n] for n in self.timeouts if n not in self._optional}
         return {n: one for n, one in needed.items() if one.error or self.timeouts[n] < math.inf}
+
+
+MAX_STEP = 0.1
+"""Difference of the system clock from the monotonic clock that counts as a step [s]; a clock that
+is only slewed gains 0.5 ms a second at most."""
+MAX_SIMULATED_STEP = 1.0
+"""Advance of a simulated clock between two updates that counts as a step [s]."""
+USUAL_PERIOD = 0.02
+"""Longest time between two checks that counts towards standing still [s]."""
+STOPPED = "/clock stands still"
+
+
+class ClockWatch:
+    """Compares the clock of the stamps with the monotonic clock, once an update."""
+
+    def __init__(self, timeout: float):
+        """Allow a simulated clock to stand still for `timeout` [s]."""
+        self.timeout = timeout
+        """Time for which a simulated clock may stand still [s]."""
+        self._last: tuple[float, int] | None = None
+        self._advanced_at = 0.0
+        self.stepped = False
+        """True if the last check found a step; stamps from before it mean nothing now."""
+
+    def check(self, now: float, clock: int, simulated: bool) -> str:
+        """Return what is wrong with the clock; empty if nothing is.
+
+        Args:
+            now: Monotonic time [s].
+            clock: Clock of the stamps [ns].
+            simulated: Whether it follows /clock.
+        """
+        if self._last is None:
+            self._last, self._advanced_at = (now, clock), now
+        advance = (clock - self._last[1]) / NANOSECONDS
+        if simulated:
+            self.stepped = not 0.0 <= advance <= MAX_SIMULATED_STEP
+        else:
+            self.stepped = abs(advance - (now - self._last[0])) > MAX_STEP
+        if advance or not simulated:
+            # It may have advanced for the last time soon after the last check.
+            self._advanced_at = max(self._last[0], now - USUAL_PERIOD)
+        self._last = now, clock
+        if self.stepped:
+            return "the clock was stepped back" if advance < 0.0 else "the clock was stepped ahead"
+        return STOPPED if now - self._advanced_at > self.timeout else ""

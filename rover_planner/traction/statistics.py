@@ -2,14 +2,26 @@
 """Times and counts of a traction controller, for diagnostics and measurements."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from rover_planner.traction.traction_service import TractionCommand
+from rover_planner.traction.traction_service import (
+    DISABLED,
+    EMERGENCY_STOP,
+    STALLED,
+    TractionCommand,
+)
 
 MAX_TIMES = 6000
 """Number of updates whose times are kept: one minute at 100 Hz."""
+ADVICE = {
+    DISABLED: "disabled: call ~/enable to drive",
+    EMERGENCY_STOP: "emergency_stop: release it, then call ~/enable",
+    STALLED: "stalled: no progress; command zero or the other direction to drive again",
+}
+"""What is told of states in which the rover rests without a fault."""
 
 
 class TractionStatistics:
@@ -69,5 +81,24 @@ def _describe_update(update: TractionCommand) -> dict[str, Any]:
         "friction_slack": round(answer.friction_slack, 4),
         "load_slack_N": round(answer.load_slack, 3),
         "torque_slack_Nm": round(answer.torque_slack, 4),
-        "warning": update.warning,
     }
+
+
+def judge_update(update: TractionCommand, problems: Sequence[str]) -> tuple[str, str]:
+    """Return level and text of an update for diagnostics, with problems that stop no rover.
+
+    It is an error if there is a fault; a warning if the rover is stalled, is stopped by the
+    emergency stop, drives with equal torques or has a problem.
+    """
+    answer, state = update.answer, update.state
+    if update.fault:
+        return "error", f"{state}: {update.fault}"
+    if state in (EMERGENCY_STOP, STALLED):
+        return "warning", ADVICE[state]
+    if answer is not None and answer.fallback:
+        return "warning", "equal torques: not solved"
+    if problems:
+        return "warning", f"{state}: {'; '.join(problems)}"
+    if update.estimate is not None:
+        return "ok", f"{state}: contact angles from {update.estimate.source}"
+    return "ok", ADVICE.get(state, state)

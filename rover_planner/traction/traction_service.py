@@ -12,7 +12,7 @@ from rover_physics.errors import ModelError
 from rover_physics.names import OPTIMAL, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steered_drive import SteeredDrive
-from rover_physics.rover.steering_joints import steered_wheels, steering_joints
+from rover_physics.rover.steering_joints import steered_wheels
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import (
@@ -32,8 +32,7 @@ from rover_physics.traction.solver import (
 from rover_physics.traction.wheel_course import WheelCourse
 from rover_planner.parameters.shared import STOP
 from rover_planner.traction.input_monitor import InputMonitor
-from rover_planner.traction.joint_memory import JointMemory
-from rover_planner.traction.limits import MeasurementLimits
+from rover_planner.traction.joint_memory import MAX_TURNING_RATE, JointMemory
 from rover_planner.traction.loops import (
     HEADING_INTEGRAL_GAIN,
     MAX_PUSH,
@@ -91,7 +90,19 @@ class TractionService:
         self._workspace = TractionWorkspace()
         self.monitor = InputMonitor({}, optional=(ODOMETRY,))
         """Times and errors of the inputs; odometry is never a fault."""
-        self._follow_steering(settings)
+        self._finder: MapContactFinder | None = None
+        self._begin(settings)
+
+    def _begin(self, settings: TractionSettings) -> None:
+        """Start with a rover, of which nothing is measured yet."""
+        rover = settings.rover
+        self.joints = JointMemory(rover)
+        """Last measurements of the joints."""
+        self.monitor.forget()
+        self._steered, self.course = steered_wheels(rover), WheelCourse(rover)
+        """Which wheels steer, and what is asked of them."""
+        self.steering = np.zeros(WHEEL_COUNT)
+        """Last measured steering angles (6,) [rad], positive to the left."""
         self._suspension_rates: Floats | None = None
         self.roll, self.pitch = 0.0, 0.0
         """Last measured attitude [rad], pitch positive with the nose down."""
@@ -100,48 +111,32 @@ class TractionService:
         """Commanded speed [m/s] and yaw rate [rad/s], within what the rover can do."""
         self._pose, self._deviation = np.zeros(4), 0.0
         self._body_speed = BodySpeed()
-        self._finder: MapContactFinder | None = None
-        self._last_time: float | None = None
-        self._last: TractionAnswer | None = None
+        self._estimator = MotionContactEstimator(rover)
         self._apply(settings)
-        self._estimator = MotionContactEstimator(settings.rover)
-        self._create_loops()
         self._reset()
 
     @property
     def settings(self) -> TractionSettings:
-        """The current settings; new ones keep the torques and what the loops have added up."""
+        """The current settings; new ones keep the torques and what the loops have added up.
+
+        After another rover all inputs must arrive anew.
+        """
         return self._settings
 
     @settings.setter
     def settings(self, settings: TractionSettings) -> None:
-        last = self._settings
-        self._apply(settings)
-        integrals = self._speed.integral, self._heading.integral
-        self._create_loops()
-        if settings.rover is last.rover:
-            self._speed.start(integrals[0])
-            self._heading.start(integrals[1])
+        if settings.rover is self._settings.rover:
+            speed, heading = self._speed.integral, self._heading.integral
+            self._apply(settings)
+            self._speed.start(speed)
+            self._heading.start(heading)
             return
-        self._estimator = MotionContactEstimator(settings.rover)
-        self._follow_steering(settings)
-        self._last = None
+        self._begin(settings)
         if self._finder is not None:
             self.take_map(self._finder)
 
-    def _follow_steering(self, settings: TractionSettings) -> None:
-        """Ask for the joints of a rover; all inputs must arrive anew."""
-        rover = settings.rover
-        self.joints = JointMemory(steering_joints(rover))
-        """Last measurements of the joints."""
-        self.monitor.forget()
-        self._steered, self.course = steered_wheels(rover), WheelCourse(rover)
-        """Which wheels steer, and what is asked of them."""
-        self.steering = np.zeros(WHEEL_COUNT)
-        """Last measured steering angles (6,) [rad], positive to the left."""
-
     def _apply(self, settings: TractionSettings) -> None:
-        """Take what follows from settings and has no state."""
+        """Take what follows from settings, and create the loops with their gains."""
         self._settings = settings
         rover, parameters = settings.rover, settings.parameters
         self._radius = rover.wheel.radius
@@ -150,22 +145,28 @@ class TractionService:
             for name in (JOINT_STATES, IMU, CMD_VEL, ODOMETRY)
         } | {STOP: parameters.stop_timeout or math.inf}
         self.monitor.tolerance = parameters.stamp_tolerance
-        self._writer = BalanceWriter(rover, settings.payload)
-        self._limits, self._drive = MeasurementLimits(rover), SteeredDrive(rover)
+        self._writer, self._drive = BalanceWriter(rover, settings.payload), SteeredDrive(rover)
         self._optimal = parameters.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
         self._inputs = ProgramInputs(friction, settings.max_torque, rover.wheel.radius)
-
-    def _create_loops(self) -> None:
-        """Create the loops of speed and heading with the current gains."""
-        rover, gains = self._settings.rover, self._settings.parameters
-        weight = self._writer.weight
-        mass, max_push = weight / rover.gravity, MAX_PUSH * weight
-        self._speed = PushLoop(mass * gains.speed_gain, mass * gains.travel_gain, max_push)
+        mass, max_push = self.weight / rover.gravity, MAX_PUSH * self.weight
+        self._speed = PushLoop(
+            mass * parameters.speed_gain, mass * parameters.travel_gain, max_push
+        )
         half_track = rover.suspension.wheels["middle"][1]
-        gain = half_track**2 * (mass * gains.heading_gain)
+        gain = half_track**2 * (mass * parameters.heading_gain)
         self._heading = PIController(gain, HEADING_INTEGRAL_GAIN * gain, max_push * half_track)
-        self._slip = SlipControl(self._settings.slip_gain, self._settings.max_torque)
+        self._slip = SlipControl(settings.slip_gain, settings.max_torque)
+
+    def _reset(self) -> None:
+        """Discard the last answer and set all integrals to zero."""
+        self._speed.start()
+        self._heading.start()
+        self._slip.detector = StallDetector()
+        self._last_time: float | None = None
+        self._last: TractionAnswer | None = None
+        self._limited, self._peak = False, 0.0
+        self._torques = np.zeros(WHEEL_COUNT)
 
     @property
     def weight(self) -> float:
@@ -199,7 +200,7 @@ class TractionService:
         A message may hold some of the joints only; each keeps its last value and time. `stamp` is
         the header stamp [ns], 0 if there is none; values whose stamp does not advance are old.
         """
-        wrong = self._limits.find_wrong_joint(positions, velocities)
+        wrong = self.joints.find_wrong(positions, velocities)
         if wrong:
             self.monitor.refuse(JOINT_STATES, wrong, now)
             return
@@ -223,9 +224,9 @@ class TractionService:
 
         `rates` is the angular velocity (3,) in the body frame [rad/s], None if not measured.
         """
-        wrong = self._limits.find_wrong_rates(rates)
-        if wrong:
-            self.monitor.refuse(IMU, wrong, now)
+        if rates is not None and not all(abs(one) <= MAX_TURNING_RATE for one in rates.tolist()):
+            must = f"it must be within {MAX_TURNING_RATE:g} rad/s"
+            self.monitor.refuse(IMU, f"imu has angular velocity {rates.tolist()}; {must}", now)
             return
         self.roll, self.pitch, self._body_rates = roll, pitch, rates
         self.monitor.take(IMU, now)
@@ -266,10 +267,10 @@ class TractionService:
 
     def find_fault(self, now: float) -> str:
         """Return the fault of the inputs at time `now` [s]; empty if there is none."""
-        if not self.monitor.is_fresh(JOINT_STATES, now) and not self.joints.is_empty:
-            missing = self.joints.describe_older(now - self.monitor.timeouts[JOINT_STATES])
-            self.monitor.describe(JOINT_STATES, missing)
-        return self.monitor.find_fault(now)
+        older = ""
+        if not self.monitor.is_fresh(JOINT_STATES, now):
+            older = self.joints.describe_older(now - self.monitor.timeouts[JOINT_STATES])
+        return self.monitor.find_fault(now, {JOINT_STATES: older})
 
     def start_from(self, torques: Floats) -> None:
         """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
@@ -307,16 +308,6 @@ class TractionService:
         """Return zero torques at once, and reset the loops."""
         self._reset()
         return TractionCommand(np.zeros(WHEEL_COUNT), fault, state=FAULT)
-
-    def _reset(self) -> None:
-        """Discard the last answer and set all integrals to zero."""
-        self._speed.start()
-        self._heading.start()
-        self._slip.detector = StallDetector()
-        self._last_time = None
-        self._last = None
-        self._limited, self._peak = False, 0.0
-        self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
         """Return the contact angles of the best source, and a warning, empty if none."""

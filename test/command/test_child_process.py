@@ -10,7 +10,7 @@ import pytest
 
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from support.project.checkout import TOP
-from support.waiting import is_running, wait_until, wait_until_gone
+from support.waiting import is_running, wait_until_gone
 
 STUBBORN = """
 import signal, subprocess, sys, time
@@ -31,8 +31,8 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 with stopping_children() as children:
     child = ChildProcess("polite", (), os.environ, Path(sys.argv[1]) / "log")
     children.append(child)
-    next(child.lines())
-    print(child._process.pid, flush=True)
+    child.stdout.readline()
+    print(child.pid, flush=True)
     while True:  # a signal that comes just before a sleep does not end this sleep
         time.sleep(0.1)
 """
@@ -53,19 +53,17 @@ def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
     with stopping_children() as children:
         child = ChildProcess("stubborn", (), environment, tmp_path / "log")
         children.append(child)
-        inner = int(next(child.lines()))
+        inner = int(child.stdout.readline())
         assert is_running(inner)
-        assert child.running
-    assert not child.running
-    assert child.exit_code == -signal.SIGKILL
+        assert child.poll() is None
+    assert child.poll() == -signal.SIGKILL
     wait_until_gone(inner)
 
 
 def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environment):
     child = ChildProcess("failing", (), environment, tmp_path / "log")
-    assert list(child.lines()) == []
-    wait_until(lambda: not child.running, "its end")
-    assert child.exit_code == 1
+    assert list(child.stdout) == []
+    assert child.wait(60) == 1
     assert child.last_line() == "no luck today"
     child.stop()
     child.stop()

@@ -164,7 +164,7 @@ def files(tmp_path, monkeypatch):
     return write_ground_and_path(tmp_path)
 
 
-ENDS = ["--start=1,2,0", "--goal=3,2,0"]
+AHEAD = ["--start=1,2,0", "--goal=3,2,0"]
 PREDICT = ["predict", "lsr1", "terrain.npz", "poses.npz", "out.npz"]
 REFUSED = [
     ([], "command"),
@@ -178,7 +178,7 @@ REFUSED = [
     (["replay-plan", "terrain.npz", "o.npz"], "terrain.npz holds no question for a path"),
     (["predict", "lsr1", "terrain.npz", "poses.npz", "./poses.npz"], "poses.npz is named twice"),
     (["advise", "lsr1", "terrain.npz", "poses.npz", "terrain.npz"], "terrain.npz is named twice"),
-    (["plan", "lsr1", "terrain.npz", "o.npz", *ENDS, "--dump", "o.npz"], "o.npz is named twice"),
+    (["plan", "lsr1", "terrain.npz", "o.npz", *AHEAD, "--dump", "o.npz"], "o.npz is named twice"),
     (["replay-plan", "o.npz", "o.npz"], "o.npz is named twice"),
     (["learn", "lsr1", "terrain.npz", "a.csv", "a.csv"], "a.csv is named twice"),
     (["urdf", "a.yaml", "a.yaml"], "a.yaml is named twice"),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rover_physics import Terrain, load_terrain
-from rover_planner.demo.goals import choose_mission, footprint_radius
+from rover_physics.rover.steering_joints import swing_radius
+from rover_planner.demo.goals import choose_mission
 from rover_planner.errors import PlanningError
 from support.rovers import LSR1
 
@@ -18,7 +19,7 @@ def by_intent(mission):
 
 def test_goals_are_what_they_say_and_plain_ones_and_the_start_stand_apart_on_known_ground():
     spirit, turn = load_terrain("spirit").fill_gaps(0.2), np.linspace(0.0, 2.0 * np.pi, 20)
-    around = 0.5 * footprint_radius(LSR1)
+    around = 0.5 * swing_radius(LSR1)
     for seed in (1, 2):
         mission = choose_mission(spirit, LSR1, seed)
         places = by_intent(mission)
@@ -34,7 +35,7 @@ def test_goals_are_what_they_say_and_plain_ones_and_the_start_stand_apart_on_kno
             beneath = spirit.elevation_at(x + around * np.cos(turn), y + around * np.sin(turn))
             assert np.isfinite(beneath).all()
         away = [math.hypot(x - mission.start[0], y - mission.start[1]) for x, y, _ in plain]
-        assert min(away) > 2.0 * footprint_radius(LSR1)
+        assert min(away) > 2.0 * swing_radius(LSR1)
 
 
 def test_a_map_smaller_than_the_rover_is_refused():

@@ -167,6 +167,27 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
+@pytest.mark.parametrize("wheels", [3, 6])
+def test_wheels_whose_rates_are_missing_while_the_rover_stands_do_not_slip_and_are_not_stuck(
+    wheels,
+):
+    rows = climb(ROVER, SLOPE, 20.0)[::5]
+    rows[80:, X] -= rows[120, X] - rows[80, X]
+    rows[80:120, X] = rows[80, X]
+    rows[80:120, RATES] *= 0.001
+    rows[80:120, RATES.start : RATES.start + wheels] = np.nan
+    learner = GroundLearner(ROVER, RAMP)
+    assert not any((learner.take(row), learner.stuck)[1] for row in rows)
+    assert learner.estimate.slip_time is None
+
+
+def test_a_torque_that_is_the_same_after_a_gap_is_not_frozen():
+    rows = climb(ROVER, SLOPE, 12.0)[::5]
+    rows[61:, TIME] += 3600.0
+    rows[61:64, TORQUES.start] = rows[60, TORQUES.start]
+    assert not learn(rows[:64]).estimate.faults
+
+
 def test_stamps_that_are_not_regular_make_windows_no_longer():
     rows = climb(ROVER, SLOPE, 12.0)[::5]
     regular = learn(rows).window

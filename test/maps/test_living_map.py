@@ -96,6 +96,24 @@ def test_the_surer_height_wins_until_it_has_aged():
     np.testing.assert_array_equal(living.snapshot().terrain.elevation_std, 0.002)
 
 
+def test_a_map_that_merges_into_one_that_was_replaced_wins_though_its_clock_went_back():
+    living = LivingMap()
+    living.replace(local_map((0.0, 0.0), 0.1), TOPIC, 1e9)
+    living.merge(local_map((0.0, 0.0), 0.2), TOPIC, 3.0)
+    assert cell(living, 0.5, 0.5) == (0.2, TOPIC, 3.0)
+
+
+def test_without_a_window_any_more_the_whole_loaded_map_is_there_again():
+    living = loaded(map_window=2.0)
+    living.merge(local_map((0.0, 0.0), 1.0), TOPIC, 1.0)
+    living.values = TraverseServerParameters()
+    living.merge(local_map((0.0, 0.0), 1.0), TOPIC, 2.0)
+    own = loaded()
+    own.merge(local_map((0.0, 0.0), 1.0), TOPIC, 2.0)
+    x, y = PRIOR.origin
+    assert cell(living, x, y) == cell(own, x, y)
+
+
 @pytest.mark.parametrize(
     ("rules", "std"),
     [

@@ -10,12 +10,10 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import Imu
 
-from msg_adapters.commands import twist_to_speeds
+from msg_adapters.commands import target_to_point, twist_to_speeds, wrench_to_force_and_moment
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_transform
-from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.odometry import odometry_to_pose
-from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
+from msg_adapters.sensors import ImuMounting, imu_to_attitude, odometry_to_pose
 from rover_planner.planning.navigation.transforms import Rigid
 from support.messages import make_target, make_wrench, odometry_at, transform_message
 

@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
 from msg_adapters.paths import settled_path
-from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
+from msg_adapters.results.diagnostics import VERDICT, make_status, texts_of, to_json
 from msg_adapters.results.markers import GREEN, LIME, RED, path_markers
 from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
 from rover_physics import Terrain, judge_path
@@ -125,9 +125,7 @@ def test_every_entry_of_a_verdict_becomes_a_key_and_a_value():
         "goal": ([1.0, None], "[1.0, null]"),
     }
     entries = {key: value for key, (value, _) in told.items()}
-    message = verdict_to_diagnostics("error", "tilt 0.6 rad", entries, "lsr1", HEADER)
-    assert message.header.frame_id == "map" and message.header.stamp == STAMP
-    (status,) = message.status
+    status = make_status(VERDICT, "error", "tilt 0.6 rad", texts_of(entries), "lsr1")
     assert status.level == DiagnosticStatus.ERROR and status.message == "tilt 0.6 rad"
     assert status.hardware_id == "lsr1" and status.name
     values = {entry.key: entry.value for entry in status.values}

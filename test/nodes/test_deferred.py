@@ -12,7 +12,7 @@ from rover_planner.ros import deferred
 from rover_planner.ros.deferred import AT_ONCE, PAUSE, PacedSender
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.lazy_publisher import LazyPublisher
-from rover_planner.ros.qos import result_qos
+from rover_planner.ros.qos import RESULT_QOS
 from support.waiting import repeat_until, wait_until
 
 
@@ -26,7 +26,7 @@ def listen(ros, name="listener"):
     """Return a new listener and the numbers that it hears."""
     heard, node = [], Node(name, context=ros.context)
     node.create_subscription(
-        Int32, "numbers", lambda number: heard.append(number.data), result_qos()
+        Int32, "numbers", lambda number: heard.append(number.data), RESULT_QOS
     )
     return ros.spin(node), heard
 

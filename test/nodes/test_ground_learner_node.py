@@ -13,20 +13,21 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.sensing import imu_message
+from msg_adapters.sensors import imu_message
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
-from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
+from rover_planner.learning.drive_log import PITCH, RATES, ROLL, TIME, YAW, X
 from rover_planner.nodes import ground_learner
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
-from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, TOPIC_QOS
+from rover_planner.ros.row_collector import RowCollector
 from support.grounds import plane
 from support.learning_drives import climb
-from support.messages import row_messages
+from support.messages import odometry_at, row_messages
 from support.ros_fixtures import RosRun, hear
 from support.rovers import LSR1
 from support.waiting import repeat_until, wait_until
@@ -41,13 +42,13 @@ class Rover(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("rover", context=ros.context)
-        self.map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        self.map = self.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
         kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
-        self.senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
-        self.estimates = hear(self, String, ground_learner.ESTIMATE, latched_qos())
-        self.wheels = hear(self, Odometry, "ground_learner/odometry", topic_qos())
-        self.marks = hear(self, String, ground_learner.MARK_PLACE, latched_qos())
-        self.stops = hear(self, Bool, ground_learner.EMERGENCY_STOP, latched_qos())
+        self.senders = {n: self.create_publisher(k, n, TOPIC_QOS) for n, k in kinds.items()}
+        self.estimates = hear(self, String, ground_learner.ESTIMATE, LATCHED_QOS)
+        self.wheels = hear(self, Odometry, "ground_learner/odometry", TOPIC_QOS)
+        self.marks = hear(self, String, ground_learner.MARK_PLACE, LATCHED_QOS)
+        self.stops = hear(self, Bool, ground_learner.EMERGENCY_STOP, LATCHED_QOS)
 
     @property
     def estimate(self) -> dict:
@@ -121,6 +122,17 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
         return len(rover.estimates) > told[0] + 1 and len(rover.wheels) > told[1] + 1
 
     wait_until(are_told, "what is told after the clock was set back")
+
+
+def test_joints_whose_driver_has_ended_were_not_measured():
+    rows, joints = RowCollector(), JointState(name=[*WHEEL_JOINTS], velocity=[0.3] * 6)
+    rows.take_joints(joints, 10.0)
+    assert (rows.at(0.0, 10.4)[RATES] == 0.3).all()
+    for late in (10.6, 9.0):  # or the clock was set back
+        assert np.isnan(rows.take_odometry(odometry_at([1.0, 0.0, 0.0]), 0.0, late)[RATES]).all()
+    rows.take_joints(joints, 9.1)
+    row = rows.at(0.0, 9.2)
+    assert (row[RATES] == 0.3).all() and row[X] == 1.0
 
 
 def test_steering_and_imu_are_read_as_the_parameters_say(ros):

@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from rover_planner.ros.guard import Guard, GuardedExecutor, Handover
 from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
 from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import TOPIC_QOS
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
@@ -101,9 +101,9 @@ def test_a_message_that_is_left_alone_ends_no_wait(ros):
     node = Fragile(ros.context)
     node.timer.cancel()
     heard = []
-    PolledTopics(node, node.guard).subscribe(String, "news", heard.append, topic_qos())
+    PolledTopics(node, node.guard).subscribe(String, "news", heard.append, TOPIC_QOS)
     speaker = ros.spin(Node("speaker", context=ros.context))
-    news = speaker.create_publisher(String, "news", topic_qos())
+    news = speaker.create_publisher(String, "news", TOPIC_QOS)
     wait_until(lambda: news.get_subscription_count() > 0, "the subscription")
     news.publish(String(data="later"))
     assert news.wait_for_all_acked(Duration(seconds=20.0))

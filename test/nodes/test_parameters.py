@@ -13,10 +13,9 @@ from rclpy.parameter import Parameter
 
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.__main__ import TABLES, parameters_document
-from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.table import ParameterError, specs_of
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, declare_parameters
 
 BARE = partial(Node, "parameter_test")
 WITH_TABLE = partial(RoverNode, "parameter_test", TraverseServerParameters)

@@ -9,7 +9,7 @@ from std_msgs.msg import String
 
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import TOPIC_QOS
 from support.waiting import wait_until
 
 NAMES, WORDS = ("questions", "answers"), ["bad", "good", "better", "best"]
@@ -26,10 +26,10 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
 
     topics = PolledTopics(node, guard)
     for name in NAMES:
-        topics.subscribe(String, name, take, topic_qos())
+        topics.subscribe(String, name, take, TOPIC_QOS)
     ros.spin(node)
     speaker = ros.spin(Node("speaker", context=ros.context))
-    publishers = [speaker.create_publisher(String, name, topic_qos()) for name in NAMES]
+    publishers = [speaker.create_publisher(String, name, TOPIC_QOS) for name in NAMES]
     for publisher in publishers:
         wait_until(publisher.get_subscription_count, "the subscription")
     topics.poll()

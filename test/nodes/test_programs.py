@@ -14,7 +14,7 @@ import yaml
 from rclpy.node import Node
 
 from rover_planner.nodes import start
-from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.start import PROGRAMS
 from rover_planner.shell.extras import PLAIN
 from support.project.checkout import TOP, setup_arguments
 from support.ros_fixtures import domain_id
@@ -30,7 +30,7 @@ RUN_ALL = """
 import contextlib, io, json, sys
 sys.modules["rclpy"] = None
 from rover_planner.nodes import start
-from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.start import PROGRAMS
 ended = {}
 for name in PROGRAMS:
     sys.argv, out, err = [name, "--help"], io.StringIO(), io.StringIO()
@@ -143,10 +143,8 @@ def test_a_node_in_a_namespace_has_the_topics_of_the_help_and_tells_of_wrong_par
     if file.exists():
         words += ["--params-file", str(file), "-r", "diagnostics:=/diagnostics"]
         wrong = {"rovr": "lsr1", "use_sim_time": False}
-    (kind,) = (
-        one for one in vars(MODULES[name]).values()
-        if isinstance(one, type) and issubclass(one, Node) and one.__module__.endswith(name)
-    )  # fmt: skip
+    kinds = [kind for kind in vars(MODULES[name]).values() if isinstance(kind, type)]
+    (kind,) = [kind for kind in kinds if issubclass(kind, Node) and ".nodes." in kind.__module__]
     node = ros.start(kind, ["--ros-args", *words], **wrong)
     assert node.get_fully_qualified_name() == f"/one/{name}"
     if file.exists():

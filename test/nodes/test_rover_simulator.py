@@ -11,7 +11,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.imu import imu_to_attitude
+from msg_adapters.sensors import imu_to_attitude
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics import save_terrain
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -19,7 +19,7 @@ from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
-from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS, TOPIC_QOS
 from support.grounds import make_terrain, waves
 from support.ros_fixtures import PATIENT, hear, run_in_executor
 from support.waiting import wait_until
@@ -55,11 +55,11 @@ class Ear(Node):
 
     def __init__(self, ros):
         super().__init__("ear", context=ros.context)
-        self.joint_states = hear(self, JointState, "joint_states", topic_qos())  # reliable
-        self.imu = hear(self, Imu, "imu", sensor_qos())
-        self.clouds = hear(self, PointCloud2, "elevation_cloud", map_qos())
+        self.joint_states = hear(self, JointState, "joint_states", TOPIC_QOS)  # reliable
+        self.imu = hear(self, Imu, "imu", SENSOR_QOS)
+        self.clouds = hear(self, PointCloud2, "elevation_cloud", LATCHED_QOS)
         self.diagnostics = hear(self, DiagnosticArray, "/diagnostics")
-        self._commands = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
+        self._commands = self.create_publisher(TwistStamped, "cmd_vel", SENSOR_QOS)
 
     def command(self, speed, yaw_rate=0.0):
         twist = TwistStamped()

@@ -6,12 +6,12 @@ from functools import partial
 
 import pytest
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import map_qos
+from rover_planner.ros.qos import LATCHED_QOS, make_qos
 from rover_planner.ros.subscriptions import subscribe_to_map
 from support.waiting import repeat_until, wait_until
 
@@ -42,7 +42,7 @@ def advertise(ros):
 @pytest.mark.parametrize(
     ("values", "qos"),
     [
-        ({}, map_qos(DurabilityPolicy.VOLATILE)),
+        ({}, make_qos(1)),
         ({"input_reliability": "best_effort"}, BEST_EFFORT),
     ],
 )
@@ -54,12 +54,12 @@ def test_volatile_maps_and_where_the_parameter_says_so_best_effort_ones_are_hear
 
 
 def test_a_map_is_not_heard_again_when_a_silent_publisher_comes(advertise, hear):
-    publisher = advertise(map_qos())
+    publisher = advertise(LATCHED_QOS)
     publisher.publish(PointCloud2(width=1))  # before who hears it has started
     heard = hear()
     wait_until(lambda: heard, "the map")
     wait_until(lambda: publisher.get_subscription_count() == 2, "both subscriptions")
-    silent = advertise(map_qos(DurabilityPolicy.VOLATILE))
+    silent = advertise(make_qos(1))
     wait_until(lambda: silent.get_subscription_count() == 1, "the volatile subscription")
     time.sleep(0.5)
     assert len(heard) == 1

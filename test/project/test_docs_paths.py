@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from rover_planner.cli import app
-from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.start import PROGRAMS
 from support.project.checkout import TOP, console_scripts
 
 PAGES = sorted(

@@ -15,7 +15,7 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import preset_names
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.rover.urdf.write_urdf import write_urdf
-from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.start import PROGRAMS
 from support.project.checkout import TOP, console_scripts
 from support.project.launch_files import describe, start_rover
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import rover_physics
-from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.start import PROGRAMS
 from rover_planner.shell.extras import PLAIN
 from support.project.checkout import TOP, console_scripts, setup_arguments
 

@@ -16,7 +16,7 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.store import NOTES, SurveyStore
-from rover_planner.survey.survey import prepare_survey
+from rover_planner.survey.survey import prepare_survey, summarise
 from support.grounds import raised
 from support.rovers import LSR1, M2020
 from support.survey_maps import (
@@ -64,6 +64,14 @@ def test_finished_chunks_are_not_done_again_and_half_written_or_lost_ones_are(fi
     assert again.chunks == [(0, 0), (0, 1), (1, 1), (2, 1)] and again.finished == 5
     assert_same_bits(layers_of(compute_here(again).store), before)
     assert prepare(finished, request).chunks == []
+
+
+def test_shares_of_the_summary_add_up_to_1_where_a_file_is_lost(finished):
+    store = prepare(finished, make_request(step=4, headings=2)).store
+    (store.path / "best_class/c/1/1").unlink()
+    told = summarise(store)
+    for name in ("best_class", "worst_class"):
+        assert sum(told[name].values()) == pytest.approx(1.0, abs=1e-5)
 
 
 def test_a_store_has_a_bit_for_each_of_the_most_headings(files):

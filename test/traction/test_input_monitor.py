@@ -5,9 +5,9 @@ import pytest
 
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.traction.clocks import ClockWatch
-from rover_planner.traction.input_monitor import NEVER, InputMonitor, StampError
+from rover_planner.traction.input_monitor import NEVER, ClockWatch, InputMonitor, StampError
 from rover_planner.traction.joint_memory import JointMemory
+from support.rovers import FIXED
 
 CLOCK = 1_000_000 * NANOSECONDS
 MILLISECOND = NANOSECONDS // 1000
@@ -40,8 +40,8 @@ def test_why_messages_were_not_used_is_told_with_the_fault():
 
 
 def test_wheels_and_suspension_may_come_in_messages_of_their_own_and_an_arm_changes_nothing():
-    memory = JointMemory()
-    assert memory.is_empty and memory.time == NEVER
+    memory = JointMemory(FIXED)
+    assert memory.time == NEVER
     assert memory.take(ANGLES, {}, 1.0)
     assert memory.describe_older(0.5) == f"no velocity of {', '.join(WHEEL_JOINTS)}"
     assert memory.take({}, RATES, 1.1)
@@ -52,7 +52,7 @@ def test_wheels_and_suspension_may_come_in_messages_of_their_own_and_an_arm_chan
 
 
 def test_values_with_a_stamp_that_does_not_advance_are_not_taken():
-    memory = JointMemory()
+    memory = JointMemory(FIXED)
     assert memory.take(ANGLES, RATES, 1.0, stamp=5)
     for stamp in (5, 4):
         assert not memory.take(ANGLES, RATES, 2.0, stamp=stamp)
@@ -65,7 +65,7 @@ def test_values_with_a_stamp_that_does_not_advance_are_not_taken():
 
 
 def test_rates_of_the_suspension_are_known_only_while_all_are_recent():
-    memory = JointMemory()
+    memory = JointMemory(FIXED)
     memory.take(ANGLES, RATES | dict.fromkeys(SUSPENSION_JOINTS, 0.3), 1.0)
     assert memory.find_suspension_rates(0.9) == pytest.approx([0.3] * 4)
     memory.take({}, {"rocker_left": 0.4}, 1.2)

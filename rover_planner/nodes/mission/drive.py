@@ -16,8 +16,7 @@ from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
 
 if TYPE_CHECKING:  # help of programs comes without ROS
-    from rover_planner.nodes.mission.rover_link import RoverLink
-    from rover_planner.nodes.mission.server_client import Answer, ServerClient
+    from rover_planner.nodes.mission.client import Answer, MissionPlanner
 
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
@@ -75,8 +74,7 @@ class Drive:
 
     def __init__(
         self,
-        server: "ServerClient",
-        rover: "RoverLink",
+        planner: "MissionPlanner",
         goal: Sequence[float],
         settings: DriveSettings,
         report: Callable[[str], object],
@@ -84,13 +82,12 @@ class Drive:
         """Begin.
 
         Args:
-            server: Finds the plans.
-            rover: Follows them.
+            planner: Asks for the plans, and has the rover follow them.
             goal: Where to, x, y [m] and yaw [rad].
             settings: How it is watched.
             report: Takes events in words.
         """
-        self._server, self._rover, self._goal = server, rover, goal
+        self._planner, self._goal = planner, goal
         self._settings, self._report = settings, report
         self._deadline = time.monotonic() + settings.timeout
         self._stopped_at, self._stops = np.full(3, np.inf), 0
@@ -142,28 +139,28 @@ class Drive:
 
     def _ask(self, pose: Poses) -> "Answer":
         """Ask for a path to the goal from a pose (3,)."""
-        return self._server.ask(pose.tolist(), self._goal)
+        return self._planner.ask(pose.tolist(), self._goal)
 
     def _follow(self, plan: Poses) -> Stretch:
         """Follow a plan (n, 3) to its end, or to where something hinders the rover."""
         path, index, settings = WatchedPath(plan), 0, self._settings
         standstill, rest = Standstill(settings.patience), Standstill(REST_TIME)
-        self._rover.send_path(plan)
+        self._planner.send_path(plan)
 
         def is_there(pose: Poses) -> bool:
             nonlocal index
             index = path.find_place(pose, index).index
-            rests, ended = rest.is_reached(pose, time.monotonic()), self._rover.has_ended()
+            rests, ended = rest.is_reached(pose, time.monotonic()), self._planner.has_ended()
             if ended is not None:
                 return ended
             return rests and path.is_end(index) and not self._describe_miss(pose, plan[-1])
 
         while True:
-            pose = self._rover.wait_for_pose(is_there, settings.period)
+            pose = self._planner.wait_for_pose(is_there, settings.period)
             behind = plan[: index + 1]
             if is_there(pose):
                 return Stretch(pose, self._describe_miss(pose, plan[-1]), False, behind)
-            rest_of_plan = self._server.check(plan[index:])
+            rest_of_plan = self._planner.check(plan[index:])
             if not rest_of_plan.traversable:
                 text = f"the rest of the plan is refused: {rest_of_plan.reason}"
                 return Stretch(pose, text, rest_of_plan.code == MARKED_CODE, behind)
@@ -198,7 +195,7 @@ class Drive:
         lengths = WatchedPath(self._trail).distances
         is_back = lengths >= lengths[-1] - RETREAT
         back, self._trail = self._trail[is_back][::-1], self._trail[~is_back]
-        if not self._server.check(back).traversable:
+        if not self._planner.check(back).traversable:
             return False
         self._report(f"back to {_describe(back[-1])}")
         return not self._follow(back).hindrance
@@ -208,11 +205,11 @@ class Drive:
 
         A plan from where it still moved would begin beside it, and a turn on the spot stay there.
         """
-        self._rover.send_path(pose[None, :])
+        self._planner.send_path(pose[None, :])
         rest = Standstill(REST_TIME)
         end = time.monotonic() + LONGEST_BRAKING
         while time.monotonic() < end and not rest.is_reached(pose, time.monotonic()):
-            pose = self._rover.wait_for_pose(lambda _: False, LOOK_TIME)
+            pose = self._planner.wait_for_pose(lambda _: False, LOOK_TIME)
         return pose
 
 

@@ -32,7 +32,7 @@ from rover_planner.planning.navigation.monitor import (
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import latched_qos
+from rover_planner.ros.qos import LATCHED_QOS
 
 PERIOD = 0.1
 """Time between two looks while a path is watched, and between two heartbeats [s]."""
@@ -79,8 +79,8 @@ class PathWatch:
         """True while accepted paths are watched."""
         self._reported: PathJudgement | None = None
         self._last_path: WatchedPath | None = None
-        self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
-        self._state = node.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
+        self._stop = node.create_publisher(Bool, "~/stop", LATCHED_QOS)
+        self._state = node.create_publisher(DiagnosticStatus, "~/watch", LATCHED_QOS)
         self._map_age = math.nan
         self._looked = time.monotonic()
         self._stop_is_new = threading.Event()

@@ -85,6 +85,7 @@ class LivingMap:
         cells.layers["source"][known] = self._index_of(source)
         cells.layers["time"][known] = time
         self._window = Patch(patch.box, cells.layers | patch.layers)
+        self._last[source] = time
         self._whole = terrain
 
     def merge(
@@ -239,9 +240,10 @@ class LivingMap:
                 return CellBox(row, column, n, n)
             is_near = max(abs(old.row - row), abs(old.column - column)) <= n // ROLL
             return old if is_near else CellBox(row, column, n, n)
+        if self.loaded is not None:  # a window that rolled until now may lack a part of it
+            box = box_on(self.loaded, self.grid).union(box)
         if old is None:
-            loaded = self.loaded
-            return box if loaded is None else box_on(loaded, self.grid).union(box)
+            return box
         if old.contains(box):
             return old
         union = old.union(box)

@@ -33,12 +33,12 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
-    latched_qos,
+    LATCHED_QOS,
+    RESULT_QOS,
+    SENSOR_QOS,
+    SERVICE_QOS,
+    TOPIC_QOS,
     map_subscriptions,
-    result_qos,
-    sensor_qos,
-    service_qos,
-    topic_qos,
 )
 from rover_planner.viewer.live.live_state import (
     CLICK,
@@ -81,27 +81,27 @@ class LiveListener(Node):
         self._worked_at: float | None = None
         """Stamp of the last rates of the wheels [s]."""
         self._planner = self.create_client(
-            GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
+            GetPlan, f"{SERVER}/can_traverse", qos_profile=SERVICE_QOS
         )
         self._subscribe()
 
     def _subscribe(self) -> None:
-        sensors, results, numbers = sensor_qos(), result_qos(), Float64MultiArray
+        sensors, results, numbers = SENSOR_QOS, RESULT_QOS, Float64MultiArray
         self._listen(JointState, "joint_states", self._on_joint_states, sensors, is_stream=True)
         self._listen(Odometry, ODOMETRY, self._on_odometry, sensors, is_stream=True)
         for qos, _ in map_subscriptions("either"):
             self._listen(PointCloud2, "elevation_cloud", self._on_cloud, qos)
         self._listen(Path, f"{SERVER}/plan", self._on_plan, results)
         self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, results)
-        self._listen(String, f"{SERVER}/ground_estimate", self._on_ground, latched_qos())
+        self._listen(String, f"{SERVER}/ground_estimate", self._on_ground, LATCHED_QOS)
         for topic, field in PREDICTED_FIELDS.items():
             take = partial(self._on_prediction, field)
             self._listen(numbers, f"{SERVER}/{topic}", take, results)
         for field in ESTIMATED_FIELDS:
             take = partial(self._on_estimate, field)
-            self._listen(numbers, f"{CONTROLLER}/{field}", take, topic_qos(), is_stream=True)
+            self._listen(numbers, f"{CONTROLLER}/{field}", take, TOPIC_QOS, is_stream=True)
         self._data.ages[SIGN_OF_LIFE] = TopicAge(None, True)
-        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, topic_qos())
+        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, TOPIC_QOS)
 
     def _listen(
         self, kind: Any, topic: str, take: Take, qos: QoSProfile, *, is_stream: bool = False

@@ -20,7 +20,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_planner.nodes.traction_controller import NODE_NAME, TractionController
 from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros.node import create_steady_timer
-from rover_planner.ros.qos import sensor_qos
+from rover_planner.ros.qos import SENSOR_QOS
 from support.ros_fixtures import PATIENT, hear
 from support.waiting import wait_until
 
@@ -47,8 +47,8 @@ class DrivenRover(Node):
         """Time at which each was sent [ns], largest magnitude and sum of its torques [N m]."""
         self._sent_at = 0
         self._senders = {
-            "joint_states": self.create_publisher(JointState, "joint_states", sensor_qos()),
-            "imu": self.create_publisher(Imu, "imu", sensor_qos()),
+            "joint_states": self.create_publisher(JointState, "joint_states", SENSOR_QOS),
+            "imu": self.create_publisher(Imu, "imu", SENSOR_QOS),
         }
         queue = QoSProfile(depth=QUEUE)
         latched = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -64,7 +64,7 @@ class DrivenRover(Node):
     def send_twists(self, kind: type = TwistStamped) -> None:
         """Send cmd_vel of a type from now on."""
         self.twist = kind()
-        self._senders["cmd_vel"] = self.create_publisher(kind, "cmd_vel", sensor_qos())
+        self._senders["cmd_vel"] = self.create_publisher(kind, "cmd_vel", SENSOR_QOS)
 
     def _send(self) -> None:
         self._sent_at = time.time_ns()

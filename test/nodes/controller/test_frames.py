@@ -12,7 +12,7 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.planning.navigation.transforms import Rigid
-from rover_planner.ros.qos import map_qos, sensor_qos
+from rover_planner.ros.qos import LATCHED_QOS, SENSOR_QOS
 from support.grounds import RESOLUTION, plane
 from support.messages import odometry_at, send_map_odom
 from support.ros_fixtures import run_in_executor
@@ -23,10 +23,10 @@ MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 
 
 def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller):
-    cloud = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    cloud = rover.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
     cloud.publish(terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time()))
     controller = start_controller(transform_timeout=5.0)
-    sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
+    sender = rover.create_publisher(Odometry, "odometry", SENSOR_QOS)
     send = partial(sender.publish, odometry_at((0.5, 0.0, 0.0), frame="odom"))
     wait_for = partial(repeat_until, send)
     send_map_odom(controller, MAP_ODOM, age=7.5)
@@ -49,7 +49,7 @@ def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(
 ):
     controller = start_controller(transform_timeout=5.0, map_resolution=RESOLUTION)
     ground = plane(0.1, 0.0, half=1.0)
-    sender = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    sender = rover.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
     sender.publish(terrain_to_point_cloud(ground, "odom", rover.get_clock().now().to_msg()))
     refusal = "the last map stays: no transforms connect the frames 'odom' and 'map'"
     wait_until(lambda: rover.count_lines(refusal), "the refusal")

@@ -14,7 +14,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from rover_planner.nodes.traction_controller import TractionController
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import SENSOR_QOS, TOPIC_QOS
 from support.ros_fixtures import PATIENT, call, run_in_executor
 from support.waiting import repeat_until, wait_until
 
@@ -67,7 +67,7 @@ def test_at_rest_inputs_are_read_with_each_third_update_or_before_they_are_old(r
     node.destroy_node()
 
 
-@pytest.mark.parametrize("qos", [topic_qos(), sensor_qos()], ids=["reliable", "best_effort"])
+@pytest.mark.parametrize("qos", [TOPIC_QOS, SENSOR_QOS], ids=["reliable", "best_effort"])
 def test_every_emergency_stop_is_heard_and_acts_within_one_cycle(rover, controller, enable, qos):
     button = rover.create_publisher(Bool, "traction_controller/emergency_stop", qos)
     wait_until(button.get_subscription_count, "who hears the button")
@@ -94,7 +94,7 @@ def test_an_emergency_stop_from_before_the_start_is_heard(rover, start_controlle
 
 
 def test_a_stop_of_the_watch_holds_the_rover_and_so_does_its_absence(rover, start_controller):
-    watch = rover.create_publisher(Bool, "traverse_server/stop", topic_qos())
+    watch = rover.create_publisher(Bool, "traverse_server/stop", TOPIC_QOS)
     start_controller(stop_timeout=0.5)
     wait_until(lambda: "waiting for traverse_server/stop" in rover.status.message, "the fault")
     go_on = partial(watch.publish, Bool(data=False))

@@ -9,8 +9,8 @@ import pytest
 
 from rover_planner.errors import DriveFailedError
 from rover_planner.nodes.mission import drive
+from rover_planner.nodes.mission.client import Answer
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
-from rover_planner.nodes.mission.server_client import Answer
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
@@ -83,7 +83,7 @@ def test_a_rover_before_a_place_that_is_marked_goes_back_before_it_asks_again(ma
 
     rover.ask = ask_freed
     rover.marked = MarkedPlaces((MarkedPlace(0.4, 0.0, 0.4, "stuck", "today"),))
-    Drive(rover, rover, goal, SETTINGS, told.append).run(plan)
+    Drive(rover, goal, SETTINGS, told.append).run(plan)
     assert "stuck" in told[0] and "back to" in told[1]
     assert rover.plant.pose()[0] == pytest.approx(1.5, abs=0.15)
 
@@ -94,7 +94,7 @@ def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last(make
     plan = rover.ask(rover.plant.pose(), goal).poses
     hindrance = "3 other paths led nowhere from .* stood for 0.3 s"
     with pytest.raises(DriveFailedError, match=hindrance):
-        Drive(rover, rover, goal, SETTINGS, told.append).run(plan)
+        Drive(rover, goal, SETTINGS, told.append).run(plan)
     first, again = rover.asked[1], rover.asked[2]
     assert first[0] - again[0] == pytest.approx(0.4, abs=0.15)  # back along the plan
     assert sum("has stood" in what for what in told) == 4
@@ -107,7 +107,7 @@ def test_the_next_plan_begins_where_the_rover_has_come_to_rest(make_rover):
     plan = rover.ask(rover.plant.pose(), half_way).poses
     resting = []
     tell = lambda what: resting.append(rover.plant.pose())  # noqa: E731
-    Drive(rover, rover, (1.5, 0.0, 0.0), SETTINGS, tell).run(plan)
+    Drive(rover, (1.5, 0.0, 0.0), SETTINGS, tell).run(plan)
     assert len(resting) == 1
     assert resting[0] == pytest.approx(rover.asked[1])
     assert rover.plant.pose()[0] == pytest.approx(1.5, abs=0.15)
@@ -131,7 +131,7 @@ def test_a_rover_that_ends_beside_the_goal_or_turned_away_has_not_arrived(make_r
             return (0.0, 0.0) if self.has_arrived(pose) else super().steer(pose, speed)
 
     rover.make_follower = Short
-    end = Drive(rover, rover, goal, SETTINGS, told.append).run(plan)
+    end = Drive(rover, goal, SETTINGS, told.append).run(plan)
     assert any("has ended 0.1" in what or "has stood" in what for what in told), told
     assert rover.plant.pose() == pytest.approx(goal, abs=0.1)
     assert end == pytest.approx(rover.plant.pose())

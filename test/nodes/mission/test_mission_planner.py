@@ -14,11 +14,10 @@ from rclpy.node import Node
 from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
-from rover_planner.errors import DriveFailedError
+from rover_planner.errors import DriveFailedError, NoAnswerError
 from rover_planner.nodes import mission_planner
-from rover_planner.nodes.mission.server_client import NoAnswerError
 from rover_planner.nodes.mission_planner import main
-from rover_planner.nodes.programs import MissionOptions, read_arguments
+from rover_planner.nodes.start import MissionOptions, read_arguments
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, rock_left, wall_at, waves
@@ -172,12 +171,12 @@ def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhe
         make_planner(timeout=2.0, cli_args=["--ros-args", "-r", f"__node:={name}"])
         for name in ("first", "second")
     )
-    first.rover.send_path(np.zeros((1, 3)))
+    first.send_path(np.zeros((1, 3)))
     with pytest.raises(NoAnswerError, match="the end of first, which sends the rover paths"):
-        second.rover.send_path(np.zeros((1, 3)))
+        second.send_path(np.zeros((1, 3)))
     path = rover.create_publisher(Path, "path", 10)
     with pytest.raises(DriveFailedError, match="another node has sent the rover a path"):
         for _ in range(100):
             odometry.publish(odometry_at((0.0, 0.0, 0.0)))
             path.publish(poses_path(np.ones((2, 3)), "map"))
-            first.rover.wait_for_pose(lambda pose: True, 0.1)
+            first.wait_for_pose(lambda pose: True, 0.1)

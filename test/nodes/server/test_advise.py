@@ -10,7 +10,7 @@ from std_srvs.srv import Trigger
 from rover_planner.advice import seek
 from rover_planner.advice.advise import STOPPED
 from rover_planner.advice.levers import LEVERS
-from rover_planner.ros.qos import latched_qos
+from rover_planner.ros.qos import LATCHED_QOS
 from support.grounds import make_terrain, rock_left
 from support.planner_client import SERVER, begin_plan
 from support.ros_fixtures import call
@@ -32,7 +32,7 @@ def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ro
     advise = client.create_client(Trigger, f"{SERVER}/advise")
     grown: list[dict] = []
     client.create_subscription(
-        String, f"{SERVER}/advice", lambda one: grown.append(json.loads(one.data)), latched_qos()
+        String, f"{SERVER}/advice", lambda one: grown.append(json.loads(one.data)), LATCHED_QOS
     )
     assert json.loads(call(advise, Trigger.Request()).message)["code"] == "no_path"
     client.send_terrain(make_terrain(rock_left))

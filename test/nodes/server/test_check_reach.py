@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from std_srvs.srv import Trigger
 
 from rover_physics import judge_reach
-from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.qos import TOPIC_QOS
 from support.grounds import make_terrain
 from support.messages import make_target, make_wrench
 from support.planner_client import SERVER
@@ -23,8 +23,8 @@ TARGET, FORCE, MOMENT = (0.5, 0.3, 0.3), (3.0, 0.0, 5.0), (0.0, 0.5, 0.0)
 def test_what_is_missing_is_asked_for_in_turn_then_the_answer_is_that_of_the_model(
     server, client, ros
 ):
-    targets = client.create_publisher(PoseStamped, f"{SERVER}/tool_target", topic_qos())
-    wrenches = client.create_publisher(WrenchStamped, f"{SERVER}/tool_wrench", topic_qos())
+    targets = client.create_publisher(PoseStamped, f"{SERVER}/tool_target", TOPIC_QOS)
+    wrenches = client.create_publisher(WrenchStamped, f"{SERVER}/tool_wrench", TOPIC_QOS)
     check, arm = client.create_client(Trigger, f"{SERVER}/check_reach"), server.arm
 
     def ask() -> dict:

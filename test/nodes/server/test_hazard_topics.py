@@ -8,7 +8,7 @@ from nav_msgs.srv import GetMap
 
 from msg_adapters.results.grids import VALUES
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
-from rover_planner.ros.qos import latched_qos
+from rover_planner.ros.qos import LATCHED_QOS
 from support.grounds import make_terrain, waves
 from support.planner_client import SERVER
 from support.ros_fixtures import call, hear
@@ -27,7 +27,7 @@ def rock_at(place):
 def hear_grids(client, *names):
     """Return lists that get the grids which are published from now on, by name of the topic."""
     topics = (f"{SERVER}/hazard_map/{name}" for name in names)
-    return [hear(client, OccupancyGrid, topic, latched_qos()) for topic in topics]
+    return [hear(client, OccupancyGrid, topic, LATCHED_QOS) for topic in topics]
 
 
 def cells(grid, x=(-1.0, 1.0), y=(-1.0, 1.0)):

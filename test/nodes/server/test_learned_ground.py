@@ -10,7 +10,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_planner.ros.guard import EVENT_PERIOD
-from rover_planner.ros.qos import result_qos, topic_qos
+from rover_planner.ros.qos import RESULT_QOS, TOPIC_QOS
 from support.grounds import make_terrain, waves
 from support.planner_client import GOAL, SERVER, START, ask
 from support.ros_fixtures import call
@@ -22,7 +22,7 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
     ground = make_terrain(waves)
     classes = np.full(ground.elevation.shape, 7.0)
     client.send_terrain(replace(ground, ground_class=classes))
-    sender = client.create_publisher(String, f"{SERVER}/ground_estimate", topic_qos())
+    sender = client.create_publisher(String, f"{SERVER}/ground_estimate", TOPIC_QOS)
     assert ask(client)[1]["ground"] == "told"
     friction = {"mean": 0.5, "std": 0.05, "low": 0.4, "high": 0.6}
     learned = {"friction": friction, "classes": {"7": friction | {"mean": 0.45}}}
@@ -39,7 +39,7 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
 
 def test_a_marked_place_stays_impassable_until_places_are_cleared(shared, capfd):
     server, client = shared.server, shared.client
-    sender = client.create_publisher(String, f"{SERVER}/mark_place", topic_qos())
+    sender = client.create_publisher(String, f"{SERVER}/mark_place", TOPIC_QOS)
     place = {"x": GOAL[0], "y": GOAL[1], "radius": 0.3, "reason": "dust", "date": "today"}
     for text in ("no JSON", json.dumps(place)):
         client.send(sender, String(data=text))
@@ -53,7 +53,7 @@ def test_a_marked_place_stays_impassable_until_places_are_cleared(shared, capfd)
 
 
 def test_a_server_that_starts_anew_knows_the_places_that_were_marked_before(start_server, client):
-    sender = client.create_publisher(String, f"{SERVER}/mark_place", result_qos())
+    sender = client.create_publisher(String, f"{SERVER}/mark_place", RESULT_QOS)
     place = {"x": 0.0, "y": 0.0, "radius": 0.3, "reason": "dust"}
     for date in ("yesterday", "today"):
         sender.publish(String(data=json.dumps(place | {"date": date})))

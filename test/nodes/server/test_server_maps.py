@@ -10,8 +10,9 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics import Terrain, save_terrain
 from rover_physics.names import SUSPENSION_JOINTS
+from rover_planner.nodes import map_topics
 from rover_planner.planning.answering.map_keeper import MapKeeper
-from rover_planner.ros.qos import map_qos
+from rover_planner.ros.qos import LATCHED_QOS
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import SERVER, ask
 from support.ros_fixtures import hear
@@ -26,7 +27,7 @@ def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, t
     response = client.load_map(file)
     assert response.result == 0 and len(response.map.data) == PRIOR.elevation.size
     client.send_terrain(Terrain(np.full((20, 20), 0.5), 0.05, np.add(PRIOR.origin, 0.5)))
-    heard = hear(client, PointCloud2, f"{SERVER}/map", map_qos())
+    heard = hear(client, PointCloud2, f"{SERVER}/map", LATCHED_QOS)
     wait_until(lambda: heard, "the map")
     cloud = heard[-1]
     names = [field.name for field in cloud.fields]
@@ -36,6 +37,19 @@ def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, t
     np.testing.assert_array_equal(values[..., 2], merged.astype(np.float32))
     assert (values[10:30, 10:30, 3] == 4).all() and (values[31:, :, 3] == 1).all()
     assert values[..., 4].min() >= 0.0 and values[..., 4].max() < 60.0
+
+
+def test_an_error_in_the_thread_of_the_published_map_is_counted_and_the_next_map_comes(
+    server, client, monkeypatch
+):
+    heard = hear(client, PointCloud2, f"{SERVER}/map", LATCHED_QOS)
+    with monkeypatch.context() as broken:
+        broken.setattr(map_topics, "terrain_to_point_cloud", None)
+        client.send_terrain(PRIOR)
+        wait_until(lambda: server.guard.total, "the error")
+    assert list(server.guard.counts) == ["_publish_map: TypeError"]
+    client.send_terrain(make_terrain(wall_at(0.5)))
+    wait_until(lambda: heard, "the next map")
 
 
 @pytest.mark.timed

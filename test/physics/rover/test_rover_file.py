@@ -139,6 +139,11 @@ def test_a_stowed_arm_outside_its_limits_and_pivots_of_a_bogie_behind_are_refuse
         rover_from_dict(data, "test")
 
 
+def test_an_unknown_limit_lists_the_keys_that_a_file_may_have():
+    with pytest.raises(RoverFileError, match=r"limits\.tilted; did you mean tilt\?.* wheel_drop$"):
+        read("limits.tilted", 1.0)
+
+
 def test_an_unknown_name_lists_the_presets_or_where_was_searched():
     with pytest.raises(RoverFileError, match="no rover 'lsr2'.*presets are lsr1, m2020"):
         load_rover("lsr2")

@@ -20,7 +20,7 @@ from msg_adapters.results.predictions import waypoint_array
 from rover_physics.names import WHEEL_JOINTS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.learned_ground import LearnedGround
-from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, RESULT_QOS, SENSOR_QOS, TOPIC_QOS
 from rover_planner.viewer.live.listener import LiveListener, listen
 from rover_planner.viewer.live.live_state import (
     CLICK,
@@ -53,13 +53,13 @@ def talker(ros, listener) -> SimpleNamespace:
     """What publishes the topics of a rover, its server and its controller."""
     node = Node("talker", context=ros.context)
     topics = {
-        "joints": (JointState, "joint_states", sensor_qos()),
-        "odometry": (Odometry, "odometry", sensor_qos()),
-        "verdict": (DiagnosticArray, "/traverse_server/verdict", result_qos()),
-        "plans": (Path, "/traverse_server/plan", result_qos()),
-        "predicted": (Float64MultiArray, "/traverse_server/wheel_loads", result_qos()),
-        "estimates": (String, "/traverse_server/ground_estimate", latched_qos()),
-        "estimated": (Float64MultiArray, "/traction_controller/wheel_loads", topic_qos()),
+        "joints": (JointState, "joint_states", SENSOR_QOS),
+        "odometry": (Odometry, "odometry", SENSOR_QOS),
+        "verdict": (DiagnosticArray, "/traverse_server/verdict", RESULT_QOS),
+        "plans": (Path, "/traverse_server/plan", RESULT_QOS),
+        "predicted": (Float64MultiArray, "/traverse_server/wheel_loads", RESULT_QOS),
+        "estimates": (String, "/traverse_server/ground_estimate", LATCHED_QOS),
+        "estimated": (Float64MultiArray, "/traction_controller/wheel_loads", TOPIC_QOS),
     }
     made = {name: node.create_publisher(*topic) for name, topic in topics.items()}
     ros.spin(node)

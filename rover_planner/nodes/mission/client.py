@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client of the traverse server: its questions, and the answers with what is published then."""
+"""The node that asks the traverse server and lets a rover drive: their services and topics."""
 
 import contextlib
 import json
@@ -11,37 +11,37 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
-from nav_msgs.msg import Path
+from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.client import Client
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.publisher import Publisher
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
+from msg_adapters.sensors import odometry_to_pose
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import DriveFailedError, NoAnswerError
 from rover_planner.planning.answering.budget import STOPPING
-from rover_planner.ros.qos import map_qos, result_qos, service_qos, topic_qos
+from rover_planner.ros.qos import LATCHED_QOS, RESULT_QOS, SENSOR_QOS, SERVICE_QOS, TOPIC_QOS
 
 REPEAT = 10.0
 """Time after which a question is asked again: the server may have been started anew [s]."""
-SERVER = "traverse_server"
-"""Name of the server's node, relative to the client's namespace; remap services and topics to use
-another one."""
+NODE_NAME, SERVER = "mission_planner", "traverse_server"
+"""Names of this node, and of the server's relative to its namespace; remap services and topics to
+use another one."""
 TEXTS = ("_hash", "_stamp", "server")
 """Ends of keys whose values are texts, even if they look like numbers."""
-
-
-class NoAnswerError(Exception):
-    """What a node waits for did not come in time; the text names it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,17 +62,17 @@ class Answer:
     """All that is told of it, as JSON types."""
 
 
-class ServerClient(Node):
-    """A node that asks a server, and collects the results that it publishes with each answer.
+class MissionPlanner(Node):
+    """A node that asks a server, with the results that it publishes, and lets a rover drive.
 
     It takes messages only while it waits; nothing else is to spin it. Its methods raise
     NoAnswerError if what they wait for does not come in time.
     """
 
-    def __init__(self, name: str, frame: str, timeout: float, **node_arguments: Any):
+    def __init__(self, map_frame: str = "map", timeout: float = 60.0, **node_arguments: Any):
         """Create its topics and clients; `timeout` [s] is the longest wait for an answer."""
-        super().__init__(name, **node_arguments)
-        self.frame = frame
+        super().__init__(NODE_NAME, **node_arguments)
+        self.frame = map_frame
         """Frame of the map."""
         self._timeout = timeout
         self._executor = SingleThreadedExecutor(context=self.context)
@@ -80,20 +80,31 @@ class ServerClient(Node):
         self._verdict: dict[str, Any] = {}
         self._verdict_about: tuple[Any, Any] | None = None
         self._arrays: dict[str, np.ndarray] = {}
-        qos = service_qos()
-        self._asker = self.create_client(GetPlan, f"{SERVER}/can_traverse", qos_profile=qos)
-        self._checker = self.create_client(Trigger, f"{SERVER}/check_path", qos_profile=qos)
-        self._adviser = self.create_client(Trigger, f"{SERVER}/advise", qos_profile=qos)
+        self._asker = self.create_client(
+            GetPlan, f"{SERVER}/can_traverse", qos_profile=SERVICE_QOS
+        )
+        self._checker = self.create_client(
+            Trigger, f"{SERVER}/check_path", qos_profile=SERVICE_QOS
+        )
+        self._adviser = self.create_client(Trigger, f"{SERVER}/advise", qos_profile=SERVICE_QOS)
         self._server_parameters = AsyncParameterClient(self, SERVER)
-        self._map_topic = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self._path_topic = self.create_publisher(Path, f"{SERVER}/path", topic_qos())
+        self._map_topic = self.create_publisher(PointCloud2, "elevation_cloud", LATCHED_QOS)
+        self._path_topic = self.create_publisher(Path, f"{SERVER}/path", TOPIC_QOS)
         verdicts = self.create_subscription(
-            DiagnosticArray, f"{SERVER}/verdict", self._take_verdict, result_qos()
+            DiagnosticArray, f"{SERVER}/verdict", self._take_verdict, RESULT_QOS
         )
         self._verdicts = verdicts.topic_name  # as remapped, which count_publishers does not do
         for name in ("wheel_loads", "slip_ratios"):
             take = partial(self._take_array, name)
-            self.create_subscription(Float64MultiArray, f"{SERVER}/{name}", take, result_qos())
+            self.create_subscription(Float64MultiArray, f"{SERVER}/{name}", take, RESULT_QOS)
+        self._pose: Floats | None = None
+        self._sent = self._driven = ""
+        self._paths: Publisher | None = None
+        self._own_paths: set[str] = set()
+        self._other_path = False
+        self.create_subscription(Odometry, "odometry", self._take_odometry, SENSOR_QOS)
+        driven = self.create_subscription(String, "path_driven", self._take_driven, LATCHED_QOS)
+        self._driven_topic = driven.topic_name
 
     def wait_for_server(self) -> None:
         """Wait until the server's service and its verdict topic are connected."""
@@ -171,6 +182,67 @@ class ServerClient(Node):
         """Let the server judge by another torque policy from now on."""
         changed = self._server_parameters.set_parameters([Parameter("policy", value=policy)])
         self.wait(changed.done, f"parameter policy of {SERVER}")
+
+    def send_path(self, poses: Floats) -> None:
+        """Let the rover follow a path of poses (n, 3), x, y [m] and yaw [rad], map frame.
+
+        Raises:
+            NoAnswerError: Another node sends paths, or none subscribes to them, for all the time.
+        """
+        paths = self._paths or self._take_rover()
+        # One of those who hear it is this node.
+        self.wait(lambda: paths.get_subscription_count() > 1, "a rover on the topic path")
+        path = poses_path(poses, self.frame)
+        self._sent, self._driven = path_hash(path), ""
+        self._own_paths.add(self._sent)
+        paths.publish(path)
+
+    def _take_rover(self) -> Publisher:
+        """Return the publisher of paths, once no other node publishes any."""
+        topic = self.resolve_topic_name("path")
+        others = ", ".join(one.node_name for one in self.get_publishers_info_by_topic(topic))
+        if others:
+            self.get_logger().warning(f"waiting: {others} sends the rover paths")
+        self.wait(
+            lambda: not self.count_publishers(topic),
+            f"the end of {others}, which sends the rover paths",
+        )
+        self.create_subscription(Path, "path", self._hear_path, TOPIC_QOS)
+        self._paths = self.create_publisher(Path, "path", TOPIC_QOS)
+        return self._paths
+
+    def _hear_path(self, path: Path) -> None:
+        self._other_path |= path_hash(path) not in self._own_paths
+
+    def has_ended(self) -> bool | None:
+        """Return whether the follower is at the end of the path; None if it never says so."""
+        if not self.count_publishers(self._driven_topic):
+            return None
+        return self._driven == self._sent
+
+    def wait_for_pose(self, is_wanted: Callable[[Floats], bool], seconds: float) -> Floats:
+        """Return the first measured pose (3,) that is wanted, or the last one after some seconds.
+
+        Raises:
+            DriveFailedError: Another node has sent the rover a path.
+        """
+        if self._other_path:
+            raise DriveFailedError("another node has sent the rover a path, and drives it now")
+        self.wait(lambda: self._pose is not None, "odometry")
+        with contextlib.suppress(NoAnswerError):
+            self.wait(lambda: is_wanted(np.array(self._pose)), "the rover", seconds)
+        return np.array(self._pose)
+
+    def _take_odometry(self, odometry: Odometry) -> None:
+        try:
+            pose, _ = odometry_to_pose(odometry, self.frame)
+        except MessageError as error:
+            self.get_logger().warning(f"odometry not used: {error}", once=True)
+            return
+        self._pose = pose[[0, 1, 5]]
+
+    def _take_driven(self, message: String) -> None:
+        self._driven = message.data
 
     def wait(self, condition: Callable[[], bool], what: str, timeout: float | None = None) -> None:
         """Take what has come, and what comes until a condition holds.
