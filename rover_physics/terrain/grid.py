@@ -27,6 +27,8 @@ from rover_physics.terrain.terrain_file import GRIDS, MAX_CELLS, find_terrain_fi
 
 DIGITS = 16
 """Hexadecimal digits of a fingerprint."""
+NEIGHBOURS = ((0, 1), (0, -1), (1, 0), (-1, 0))
+"""Rows and columns from a cell to the four that share a side with it."""
 _EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
 
 
@@ -295,7 +297,7 @@ def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> N
     rows, columns = np.nonzero(gaps)
     matrix = sparse.eye(count, format="csr") * 4.0
     right_side = np.zeros(count)
-    for down, along in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+    for down, along in NEIGHBOURS:
         neighbour = index[rows + down, columns + along]
         inner = neighbour >= 0
         coupling = sparse.csr_matrix(
@@ -312,12 +314,13 @@ def _fill_with_largest(std: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDA
     """Fill each gap with the largest standard deviation around it."""
     from scipy import ndimage
 
+    labels, count = ndimage.label(gaps)
+    largest = np.zeros(count + 1)
+    rows, columns = np.nonzero(gaps)  # none at the map's edge
+    for down, along in NEIGHBOURS:
+        beside = rows + down, columns + along
+        rim = ~gaps[beside]
+        np.maximum.at(largest, labels[gaps][rim], std[beside][rim])
     filled = std.copy()
-    labels, _ = ndimage.label(gaps)
-    for label, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
-        # A gap does not touch the map's edge, so it has a rim of cells.
-        window = (slice(rows.start - 1, rows.stop + 1), slice(columns.start - 1, columns.stop + 1))
-        gap = labels[window] == label
-        rim = ndimage.binary_dilation(gap) & ~gap
-        filled[window][gap] = std[window][rim].max()
+    filled[gaps] = largest[labels[gaps]]
     return filled

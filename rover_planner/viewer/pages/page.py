@@ -13,7 +13,7 @@ from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_di
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.advice.advise import Advice, grow_advice
 from rover_planner.advice.case import case_of
-from rover_planner.advice.remedy import Remedy
+from rover_planner.advice.seek import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.documents import advice, paths
