@@ -55,6 +55,10 @@ BOX = record_type(
     ("gains", float, (2, INPUT_COUNT, OUTPUT_COUNT)),  # output changes, one input at either end
     ("smallest", float, (OUTPUT_COUNT,)),  # smallest outputs
     ("largest", float, (OUTPUT_COUNT,)),  # largest outputs
+    # largest tractions and utilisations before any utilisation is bounded: the order of wheels
+    # must not count
+    ("pull", float, (6,)),
+    ("level", float, (6,)),
     ("mu_low", float, (6,)),  # smallest friction coefficient of ground that a wheel may touch
     ("mu_high", float, (6,)),  # largest friction coefficient of that ground
     ("soils", np.int64, (6, MAX_SOILS)),  # rows of the soils that a wheel may touch
@@ -100,6 +104,11 @@ def bound_forces(model, work):
         else:
             box.smallest[PULL_OUTPUTS + wheel] = box.smallest[PULL_OUTPUTS]
             box.largest[PULL_OUTPUTS + wheel] = box.largest[PULL_OUTPUTS]
+    for wheel in range(6):
+        pulls = box.smallest[PULL_OUTPUTS + wheel], box.largest[PULL_OUTPUTS + wheel]
+        box.pull[wheel] = max(abs(pulls[0]), abs(pulls[1]))
+        box.level[wheel] = box.largest[USE_OUTPUTS + wheel]
+    for wheel in range(6):
         _bound_use(model, work, wheel)
     for edge in range(CORNERS):
         _bound_output(model, work, TIP_OUTPUTS + edge)
@@ -287,7 +296,7 @@ def _bound_use(model, work, wheel):
     each combination of signs, then for the direction and the level found.
     """
     box = work.box
-    pull = max(abs(box.smallest[PULL_OUTPUTS + wheel]), abs(box.largest[PULL_OUTPUTS + wheel]))
+    pull, level = box.pull[wheel], box.level[wheel]
     side = abs(box.base_value[SIDE_OUTPUTS + wheel])
     total = 0.0
     for k in range(INPUT_COUNT):
@@ -307,11 +316,11 @@ def _bound_use(model, work, wheel):
             pull = abs(pull) if corner < 2 else -abs(pull)
             side = abs(side) if corner % 2 == 0 else -abs(side)
         else:
-            pull, side = best_pull, best_side
+            pull, side, level = best_pull, best_side, max(level, best)
             length = np.hypot(pull, side)
         box.aim[:] = 0.0
         box.aim[PULL_OUTPUTS + wheel], box.aim[SIDE_OUTPUTS + wheel] = pull / length, side / length
-        box.aim[LOAD_OUTPUTS + wheel] = -box.largest[USE_OUTPUTS + wheel] * box.mu_low[wheel]
+        box.aim[LOAD_OUTPUTS + wheel] = -level * box.mu_low[wheel]
         _go_to_extreme(model, work)
         if box.value[USE_OUTPUTS + wheel] > best:
             best = box.value[USE_OUTPUTS + wheel]

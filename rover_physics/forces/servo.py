@@ -100,8 +100,12 @@ def write_servo_forces(model, work, result):
         result.slip_speed[wheel] = settings.speed * np.sqrt(along * along + across * across)
         result.slip_ratio[wheel] = _slip_ratio(servo, wheel)
         result.torque_saturation[wheel] = abs(torque) / settings.max_torque
-        shear += np.sqrt(traction * traction + lateral * lateral)
-        strength += result.friction[wheel] * max(N, 0.0)
+        largest, use = result.friction[wheel] * max(N, 0.0), result.friction_utilisation[wheel]
+        if servo.yields[wheel] and N > 0.0:  # resistance is no shear
+            shear += largest * (use if use < np.inf else 1.0)
+        else:
+            shear += np.sqrt(traction * traction + lateral * lateral)
+        strength += largest
         saturation += result.torque_saturation[wheel]
         power += max(torque * servo.rim_speed[wheel] * settings.speed / linkage.radius, 0.0)
     result.power = power

@@ -102,13 +102,14 @@ def predict_paths(
     started = [_StartedPath(model, poses, stop_at_failure) for poses in paths]
     going, block = started, FIRST_BLOCK if stop_at_failure else max(map(len, paths), default=0)
     cost = model.relative_cost(sum(map(len, paths)))
-    at_failure = AtFailure.LEAVE_REST if stop_at_failure else AtFailure.SEARCH_ON
     with limit_threads(cost):  # set once, not per round
         while going:
             check_interruption()
             began = time.perf_counter()
             _evaluate_block(model, going, block)
-            _search_crossings(model, going, at_failure)
+            for on in {path.searches_on for path in going}:
+                some = [path for path in going if path.searches_on == on]
+                _search_crossings(model, some, AtFailure.SEARCH_ON if on else AtFailure.LEAVE_REST)
             for path in going:
                 check_interruption()
                 path.look_for_failure()
@@ -241,6 +242,8 @@ class _StartedPath:
         """Number of waypoints up to which the crossings are known."""
         self.swept: SweptPath | None = None
         """The result once it is known."""
+        self.searches_on = not stops
+        """True once it fails where later poses decide how: nothing is left out any more."""
         self._suspicious = False
         self._crossings: list[Crossings] = []
 
@@ -253,7 +256,7 @@ class _StartedPath:
     def stretch(self) -> slice:
         """Return the waypoints between which to search crossings next, up to a sure failure."""
         end = self.evaluated
-        if self._stops:
+        if not self.searches_on:
             news = self.results[self.searched : self.evaluated]
             suspect, failure = self._find_suspects(news)
             end = self.evaluated if failure < 0 else self.searched + failure + 1
@@ -263,10 +266,17 @@ class _StartedPath:
         return slice(first, end)
 
     def take_crossings(self, crossings: Crossings) -> None:
-        """Keep the crossings of the last stretch, whose places count from the path's start."""
+        """Keep the crossings of the last stretch, whose places count from the path's start.
+
+        What is beyond a sure failure was not searched in full, and is searched again if it counts.
+        """
+        if not self.searches_on:
+            suspect, failure = self._find_suspects(crossings.results)
+            self._suspicious |= suspect >= 0
+            if failure >= 0:
+                self.searched = int(crossings.waypoint[failure]) + 1
+                crossings = crossings.select(crossings.waypoint < self.searched)
         self._crossings.append(crossings)
-        if self._stops:
-            self._suspicious |= bool(self._find_suspects(crossings.results)[0] >= 0)
 
     def _find_suspects(self, results: Any) -> tuple[int, int]:
         records, limits = self._model.records, self._model.limits.records
@@ -294,6 +304,8 @@ class _StartedPath:
             self.swept = swept
         elif failure >= 0 and (complete or failure < drops.decided):
             self.swept = swept.cut(failure + 1)
+        if failure >= 0:
+            self.searches_on = self._suspicious = True
 
 
 def find_first_failure(limits: RoverLimits, prediction: PathPrediction) -> int:

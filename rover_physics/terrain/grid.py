@@ -27,6 +27,8 @@ from rover_physics.terrain.terrain_file import GRIDS, MAX_CELLS, find_terrain_fi
 
 DIGITS = 16
 """Hexadecimal digits of a fingerprint."""
+NEIGHBOURS = ((0, 1), (0, -1), (1, 0), (-1, 0))
+"""Rows and columns from a cell to the four that share a side with it."""
 _EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
 
 
@@ -92,6 +94,23 @@ class Terrain:
             return ()
         known = self.ground_class[np.isfinite(self.ground_class)]
         return tuple(np.unique(known).astype(int).tolist())
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """16 hexadecimal digits of SHA-256 over all that defines the terrain, found once.
+
+        The bytes are: resolution, origin x and y as 64-bit floats; then per layer its name, its
+        shape and its values; then the names of the soils. Unknown cells of all kinds of NaN count
+        alike.
+        """
+        digest = hashlib.sha256(np.array([self.resolution, *self.origin], "<f8").tobytes())
+        for name in GRIDS:
+            layer = getattr(self, name)
+            if layer is not None:
+                digest.update(f"{name} {layer.shape} ".encode())
+                digest.update(_bytes(layer).data)
+        digest.update("\n".join(self.soil_names).encode())
+        return digest.hexdigest()[:DIGITS]
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -239,22 +258,6 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: Any) -> None:
         write_npz(path, entries)
 
 
-def fingerprint(terrain: Terrain) -> str:
-    """Return 16 hexadecimal digits of SHA-256 over all that defines a terrain.
-
-    The bytes are: resolution, origin x and y as 64-bit floats; then per layer its name, its shape
-    and its values; then the names of the soils. Unknown cells of all kinds of NaN count alike.
-    """
-    digest = hashlib.sha256(np.array([terrain.resolution, *terrain.origin], "<f8").tobytes())
-    for name in GRIDS:
-        layer = getattr(terrain, name)
-        if layer is not None:
-            digest.update(f"{name} {layer.shape} ".encode())
-            digest.update(_bytes(layer).data)
-    digest.update("\n".join(terrain.soil_names).encode())
-    return digest.hexdigest()[:DIGITS]
-
-
 def _bytes(layer: np.ndarray) -> np.ndarray:
     """Return the values of a layer, little-endian, with one kind of NaN."""
     values = np.ascontiguousarray(layer)
@@ -294,7 +297,7 @@ def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> N
     rows, columns = np.nonzero(gaps)
     matrix = sparse.eye(count, format="csr") * 4.0
     right_side = np.zeros(count)
-    for down, along in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+    for down, along in NEIGHBOURS:
         neighbour = index[rows + down, columns + along]
         inner = neighbour >= 0
         coupling = sparse.csr_matrix(
@@ -311,12 +314,13 @@ def _fill_with_largest(std: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDA
     """Fill each gap with the largest standard deviation around it."""
     from scipy import ndimage
 
+    labels, count = ndimage.label(gaps)
+    largest = np.zeros(count + 1)
+    rows, columns = np.nonzero(gaps)  # none at the map's edge
+    for down, along in NEIGHBOURS:
+        beside = rows + down, columns + along
+        rim = ~gaps[beside]
+        np.maximum.at(largest, labels[gaps][rim], std[beside][rim])
     filled = std.copy()
-    labels, _ = ndimage.label(gaps)
-    for label, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
-        # A gap does not touch the map's edge, so it has a rim of cells.
-        window = (slice(rows.start - 1, rows.stop + 1), slice(columns.start - 1, columns.stop + 1))
-        gap = labels[window] == label
-        rim = ndimage.binary_dilation(gap) & ~gap
-        filled[window][gap] = std[window][rim].max()
+    filled[gaps] = largest[labels[gaps]]
     return filled

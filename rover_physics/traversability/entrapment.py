@@ -47,10 +47,8 @@ DROP = 0.1
 """Drop of a wheel [wheel radii] above which the way back is checked."""
 RUN_UP = 1.0
 """Distance [wheelbases] before the first place that needs a check where the way back ends."""
-MAX_WAY_POSES = 5000
-"""Largest number of steps of a way on; poses of a path may be arbitrarily close together."""
 SPACING = 0.2
-"""Step of a way on of a path that goes nowhere [wheel radii]."""
+"""Least step of a way on [wheel radii]; poses of a path may be arbitrarily close together."""
 UNKNOWN_CODES = ("off_map", "unknown_ground")
 """Codes that close a way on only within LOOK_AHEAD wheelbases; farther ground may be open."""
 
@@ -252,9 +250,10 @@ def _paths_ahead(
 def count_steps(path: np.ndarray, length: float, radius: float) -> int:
     """Return the number of steps of a path of `length` [m], about as long as those of a path.
 
-    Their median counts, of poses that are apart; without any, SPACING of wheels of `radius` [m].
+    Their median counts, of poses that are apart, but at least SPACING of wheels of `radius` [m].
     """
     steps = np.hypot(*np.diff(path[:, :2], axis=0).T)
     steps = steps[steps > 0.0]
-    spacing = float(np.median(steps)) if steps.size else SPACING * radius
-    return min(int(np.ceil(length / spacing - 1e-6)), MAX_WAY_POSES)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    spacing = max(usual, SPACING * radius)
+    return int(np.ceil(length / spacing - 1e-6))

@@ -12,8 +12,7 @@ from rover_physics.numerics.interruption import interruptible
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.advice.case import Case, JudgedCase
-from rover_planner.advice.remedy import Remedy
-from rover_planner.advice.seek import seek_remedies
+from rover_planner.advice.seek import Remedy, seek_remedies
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_geometry import distance_along

@@ -116,6 +116,6 @@ def _read_log(path: Path, rover: "Rover", odometry_topic: str) -> "Floats":
         return read_csv(path, rover.wheel.torque_per_current)
     need("rclpy", "learn from a bag")
     need("rosbags", "learn from a bag")
-    from rover_planner.ros.bags.drive_rows import read_rows
+    from rover_planner.ros.bags.bag_files import read_rows
 
     return read_rows(path, odometry_topic)

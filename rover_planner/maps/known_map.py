@@ -28,13 +28,15 @@ class KnownMap:
     """Stamp of the map's header [ns, ROS time]; None if it has none."""
     arrival: float
     """Time of arrival [s], steady clock."""
-
-    fingerprint: str
-    """The content of the received map, see `rover_physics.terrain.grid.fingerprint`."""
     cells: CellSources | None = None
     """Source and time of each cell; None: all known cells are from `source`."""
     frame: str = ""
     """Frame of the map; empty if it has none."""
+
+    @property
+    def fingerprint(self) -> str:
+        """The content of the received map, see `Terrain.fingerprint`."""
+        return self.received.fingerprint
 
     @cached_property
     def seen(self) -> ObservedGround:

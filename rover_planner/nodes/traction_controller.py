@@ -12,12 +12,10 @@ from rclpy.duration import Duration
 from std_msgs.msg import Bool, Header
 from std_srvs.srv import SetBool
 
-from msg_adapters.commands import joint_order
 from msg_adapters.results.diagnostics import TORQUES, make_status
-from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
+from rover_physics.names import WHEEL_COUNT
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
-from rover_planner.nodes.traction.topics import TractionTopics
+from rover_planner.nodes.traction_topics import TractionInputs, TractionMaps, TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, load_kernels, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
@@ -78,9 +76,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         """Knows where the frames of messages are on the map."""
         self._maps = TractionMaps(self, self.service, self.frames)
         self._inputs = TractionInputs(self, self.service, self._maps, self.frames)
-        names = self._inputs.joint_names
-        order = joint_order(values.joints, names)
-        self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
+        self._topics = TractionTopics(self, self.service, self._inputs.joint_names)
         self._create_switches()
         self._watchdog = Watchdog(lambda: self._topics.write(np.zeros(WHEEL_COUNT), True, FAULT))
         self.follow_changes(
@@ -167,26 +163,14 @@ class TractionController(RoverNode[TractionControllerParameters]):
             now = time.monotonic()
         command = repeated or self._find_command(now)
         sent = self._watchdog.send(
-            lambda: self._write(command), now, self._find_deadline(now, command)
+            lambda: self._topics.send(command), now, self._find_deadline(now, command)
         )
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)
-            self._write(command)  # torques of a sending that hung are not the last ones
+            self._topics.send(command)  # torques of a sending that hung are not the last ones
         self._topics.publish_forces(command)
         self.statistics.take(command, start, time.perf_counter())
         self._log_changes(command, now)
-
-    def _write(self, command: TractionCommand) -> None:
-        """Publish torques, and rates and steering angles for drives that hold those."""
-        topics, service = self._topics, self.service
-        if command.state != DRIVING:
-            topics.write(command.torques, command.brake, command.state)
-            return
-        topics.write(command.torques, command.brake, command.state, service.wanted_rates)
-        if topics.steering.get_subscription_count():
-            angles = service.course.steering_aims(service.wanted)
-            if angles is not None:
-                topics.publish_steering(self._inputs.to_robot_steering(angles))
 
     def _find_repeated(self, now: float) -> TractionCommand | None:
         """Return the last command if this update is to send it again, else None."""

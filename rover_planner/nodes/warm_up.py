@@ -20,7 +20,6 @@ from rover_planner.parameters.traction_controller import TractionControllerParam
 from rover_planner.planning.search.difficulty import estimate_difficulty
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.graph import Seeds, ShortestPaths
-from rover_planner.planning.search.ground_estimate import estimate_ground
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.primitives import make_primitives
@@ -59,7 +58,7 @@ def search_lattice() -> None:
     rover, ground = load_rover("lsr1"), Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
     nodes = nodes_within(0.2, (1.0, 1.0), (2.0, 2.0))
     edges = Edges(nodes, make_primitives(rover, nodes.cell, 0.1))
-    doubt = estimate_ground(rover, ground, nodes).doubt
+    doubt = np.zeros(nodes.count, np.float32)
     difficulty = estimate_difficulty(rover, ground, nodes, 0.5, edges.primitives)
     start, goal = (Seeds(np.array([node]), np.zeros(1)) for node in (0, nodes.count - 1))
     search = ShortestPaths(edges, doubt, difficulty, start)

@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,19 +77,32 @@ class MarkedPlaces:
     ) -> NDArray[np.bool_]:
         """Return (n,) whether no path from a start (3,) may lead to ends (n, 3)."""
         refused = np.zeros(len(ends), bool)
-        for place in self.places:
+        for place in self._near(ends):
             refused |= place.is_entered(place.away(start[None, :]), place.away(ends))
         return refused
 
     def find(self, poses: NDArray[np.float64]) -> tuple[int, MarkedPlace] | None:
         """Return the first pose that comes nearer to a centre within a disc, and its place."""
         firsts = []
-        for place in self.places:
+        for place in self._near(poses):
             away = place.away(poses)
             enters = place.is_entered(away[:-1], away[1:])
             if enters.any():
                 firsts.append((1 + int(np.argmax(enters)), place))
         return min(firsts, key=lambda first: first[0], default=None)
+
+    def _near(self, poses: NDArray[np.float64]) -> list[MarkedPlace]:
+        """Return the places, of perhaps thousands, whose discs reach the box around poses."""
+        low, high = poses[:, :2].min(axis=0), poses[:, :2].max(axis=0)
+        centres, radii = self._discs
+        reached = (centres + radii >= low) & (centres - radii <= high)
+        return [self.places[k] for k in np.flatnonzero(reached.all(axis=1)).tolist()]
+
+    @cached_property
+    def _discs(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Centres (k, 2) and radii (k, 1) of the places [m]."""
+        rows = np.array([(one.x, one.y, one.radius) for one in self.places]).reshape(-1, 3)
+        return rows[:, :2], rows[:, 2:]
 
 
 NONE_MARKED = MarkedPlaces(())

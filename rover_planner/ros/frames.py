@@ -19,8 +19,12 @@ from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.sensor_mounts import read_mounts
-from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
+from rover_planner.planning.navigation.transforms import (
+    Rigid,
+    TransformError,
+    TransformTree,
+    read_mounts,
+)
 from rover_planner.shell.extras import find_type
 
 TF_DEPTH = 100

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import check_bounds, is_uncertain
-from rover_physics.terrain.grid import Terrain, fingerprint, load_terrain
+from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
@@ -78,7 +78,7 @@ def prepare_survey(
         if is_uncertain(terrain, request.sigmas):
             check_bounds(terrain, request.options)
         frame = MapFrame(terrain.elevation.shape, terrain.resolution, terrain.origin, "")
-        map_file, content = "", fingerprint(terrain)
+        map_file, content = "", terrain.fingerprint
     notes = _make_notes(request, frame, map_file, content, chunk)
     if not out.exists():
         if settings is not None:

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from msg_adapters.errors import MessageError
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
-from rover_physics.terrain.grid import fingerprint
 from support.messages import grid_map_of, set_field
 from support.project.checkout import TOP
 
@@ -37,7 +36,7 @@ def test_a_moved_buffer_start_gives_the_same_terrain_to_the_bit(row, column, ord
     unmoved = grid_map_of(layers, 0.05, centre=(1.15, -0.35))
     moved = grid_map_of(layers, 0.05, (1.15, -0.35), order=order, start=(row, column))
     assert (row, column) == (0, 0) or list(moved.data[0].data) != list(unmoved.data[0].data)
-    hashes = {fingerprint(terrain_from_grid_map(message)) for message in (moved, unmoved)}
+    hashes = {terrain_from_grid_map(message).fingerprint for message in (moved, unmoved)}
     assert len(hashes) == 1
 
 

@@ -9,8 +9,12 @@ from std_msgs.msg import Header
 from msg_adapters.stamps import ns_to_stamp
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.sensor_mounts import read_mounts
-from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
+from rover_planner.planning.navigation.transforms import (
+    Rigid,
+    TransformError,
+    TransformTree,
+    read_mounts,
+)
 from rover_planner.ros.frames import Frames
 from support.messages import transform_message
 

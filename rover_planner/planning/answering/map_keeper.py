@@ -2,7 +2,7 @@
 """Keeps the map of a server: what a loaded map, local maps and the standing rover add to it."""
 
 from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain, fingerprint
+from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
 from rover_planner.maps.moved_map import Move, move_map
 from rover_planner.parameters.traverse_server import AUTO, MERGE, TraverseServerParameters
@@ -64,7 +64,7 @@ class MapKeeper:
             PlanningError: The window would be too large.
             TerrainError: No cell of the window is known.
         """
-        content = "" if self.merges else fingerprint(terrain)
+        content = "" if self.merges else terrain.fingerprint
         if self.merges:
             centre = None if standing is None else (standing.x, standing.y)
             self._living.merge(terrain, source, time, centre)

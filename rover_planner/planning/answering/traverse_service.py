@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.terrain.grid import Terrain, fingerprint
+from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import KnownMap
@@ -51,7 +51,6 @@ class TraverseService:
         """Places that are impassable, for new questions."""
         self._edge_memory = EdgeMemory()
         self._ground: LearnedGround | None = None
-        self._assumed: tuple[ServiceSettings, LearnedGround | None, ServiceSettings] | None = None
         self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
         self._joints: dict[str, Measured] = {}
         self._pose: Measured | None = None
@@ -131,7 +130,7 @@ class TraverseService:
             cells: Where its cells come from; None if that is `source` for all.
             frame: Frame of the map; empty if it has none.
         """
-        about = KnownMap(terrain, terrain, source, stamp, self._clock(), "", cells, frame)
+        about = KnownMap(terrain, terrain, source, stamp, self._clock(), cells, frame)
         return self._keep_map(about)
 
     def amend_map(self, terrain: Terrain, cells: CellSources) -> None:
@@ -172,7 +171,7 @@ class TraverseService:
         """
         ground = None if self.settings.parameters.learn == OFF else self._ground
         known = Snapshot(
-            self._settings_on(ground),
+            self.settings.on_ground(ground),
             self.given_path,
             self.joints,
             measured_pose=self.pose_with_suspension(),
@@ -181,16 +180,6 @@ class TraverseService:
             marked=self.marked,
         )
         return self.add_map(known, ros_time)
-
-    def _settings_on(self, ground: LearnedGround | None) -> ServiceSettings:
-        """Return the settings of new questions: the same object until they or the ground change.
-
-        The watch judges again where they are another one.
-        """
-        last = self._assumed
-        if last is None or last[0] is not self.settings or last[1] is not ground:
-            last = self._assumed = self.settings, ground, self.settings.on_ground(ground)
-        return last[2]
 
     def add_map(self, snapshot: Snapshot, ros_time: int | None = None) -> Snapshot:
         """Return a snapshot with the present map; `ros_time` as for `snapshot`."""
@@ -226,17 +215,16 @@ class TraverseService:
         return classes, last[2]
 
     def _keep_map(self, about: KnownMap) -> bool:
-        """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.
+        """Keep a map, of which only the terrain is missing; return whether it is new.
 
         One that says the same as the last keeps its terrain, on which nothing is judged again.
         `prepare` makes the first question about a new one fast.
         """
-        before, content = self.known_map, fingerprint(about.received)
-        if before is not None and before.fingerprint == content:
-            same = before.received, before.terrain
-            self.known_map = replace(about, received=same[0], terrain=same[1], fingerprint=content)
+        before = self.known_map
+        if before is not None and before.fingerprint == about.fingerprint:
+            self.known_map = replace(about, received=before.received, terrain=before.terrain)
             return False
-        self.known_map = self._fill_gaps(replace(about, fingerprint=content))
+        self.known_map = self._fill_gaps(about)
         return True
 
     def _fill_gaps(self, known: KnownMap) -> KnownMap:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Transforms between frames with their times, as on /tf, and what leads from one to another."""
+"""Transforms between frames with their times, as on /tf, and where sensors are mounted."""
 
 import bisect
+import math
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.errors import PlanningError
+from rover_planner.parameters.traverse_server import NO_MOUNTS
 
 MEMORY = 10_000_000_000
 """Time for which transforms are kept [ns], as in tf2."""
@@ -22,6 +25,11 @@ transforms ahead by about a second."""
 SET_BACK = 1_000_000_000
 """Lead of the last stamp from which the clock was set back [ns]: messages that overtake each other
 differ by less."""
+
+MOUNT_FORM = "frame:x:y:z:roll:pitch:yaw, such as front_camera:0.3:0.0:0.4:0.0:0.5:0.0"
+"""Form of an entry of the parameter sensor_mounts, for error texts."""
+MAX_ARM = 100.0
+"""Largest distance of a sensor from the robot's frame along an axis [m]."""
 
 
 class TransformError(PlanningError):
@@ -227,3 +235,30 @@ class TransformTree:
                 f"{names} is not known {early:.3f} s before the oldest that is kept; use stamp 0 "
                 "for the newest"
             )
+
+
+def read_mounts(entries: Sequence[str]) -> dict[str, Rigid]:
+    """Return the mounts of the parameter sensor_mounts by the names of their frames.
+
+    Raises:
+        PlanningError: An entry has another form, or a frame has two.
+    """
+    mounts: dict[str, Rigid] = {}
+    for entry in () if entries == NO_MOUNTS else entries:
+        name, *rest = (part.strip() for part in entry.split(":"))
+        try:
+            numbers = [float(text) for text in rest]
+        except ValueError:
+            numbers = []
+        far = [n for n in numbers[:3] if not abs(n) <= MAX_ARM]
+        turned = [n for n in numbers[3:] if not abs(n) <= 2.0 * math.pi]
+        if len(numbers) != 6 or not name or far or turned:
+            raise PlanningError(
+                f"sensor_mounts has {entry!r}; it must be {MOUNT_FORM}, with lengths in m up to "
+                f"{MAX_ARM:g} and angles in rad up to 2 pi"
+            )
+        if name in mounts:
+            raise PlanningError(f"sensor_mounts has the frame {name!r} twice; it has one mount")
+        x, y, z, roll, pitch, yaw = numbers
+        mounts[name] = Rigid.from_rpy(x, y, z, roll, pitch, yaw)
+    return mounts

@@ -3,8 +3,8 @@
 
 The ground is taken as the wheels feel it: the surface on which the lowest points of spheres with
 the wheel's radius move. An edge is the more likely refused, the steeper that surface is below all
-six wheels together, and the steeper it is along the drive below one of them. The estimate orders
-the questions to the model and decides nothing.
+six wheels together, and the steeper it is along the drive below one of them; unknown ground counts
+as steep. The estimate orders the questions to the model and decides nothing.
 """
 
 import math
@@ -31,6 +31,8 @@ LEVEL, ALL_WHEELS, ONE_WHEEL = -4.6, 3.0, 1.1
 """Logit of a refusal: on level ground, and what is added for the mean steepness below the wheels
 and for the largest one along the drive, both in shares of what the rover can climb. Fitted to the
 verdicts on random edges of made and real maps, two rovers."""
+UNKNOWN = 2.1
+"""Slope of unknown ground along x and along y [slopes at which a climb ends]."""
 STEPS_PER_UNIT = 30
 """Steps per unit in which difficulties are kept."""
 LEAST_DIFFICULTY = 0.5 / STEPS_PER_UNIT
@@ -84,7 +86,9 @@ def estimate_difficulty(
     blocks = round(SHARE * nodes.cell / terrain.resolution)
     stride = max(1, min(blocks, *terrain.elevation.shape))
     felt = _felt_surface(terrain, rover.wheel.radius)
-    slopes = _steepest_slopes(felt, terrain.resolution, stride)
+    slopes = np.array(np.gradient(felt, terrain.resolution)[::-1], np.float32)
+    slopes[:, np.isnan(terrain.elevation)] = UNKNOWN * climb
+    slopes = _find_steepest(slopes, stride)
     spacing = stride * terrain.resolution
     shifts = np.rint(wheel_places(rover) / spacing).astype(np.int64)
     first = np.asarray(terrain.origin) - nodes.cell * np.array(nodes.first)
@@ -131,12 +135,9 @@ def _felt_surface(terrain: Terrain, radius: float) -> NDArray[np.float32]:
     return felt
 
 
-def _steepest_slopes(
-    heights: NDArray[np.float32], resolution: float, stride: int
-) -> NDArray[np.float32]:
+def _find_steepest(slopes: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
     """Return (2, ny, nx) slopes along x and y, the steepest of each `stride` x `stride` cells."""
-    ny, nx = (size // stride for size in heights.shape)
-    slopes = np.array(np.gradient(heights, resolution)[::-1], np.float32)
+    ny, nx = (size // stride for size in slopes.shape[1:])
     cut = slopes[:, : ny * stride, : nx * stride].reshape(2, ny, stride, nx, stride)
     blocks = cut.swapaxes(2, 3).reshape(2, ny, nx, -1)
     steepest = np.argmax(blocks[0] ** 2 + blocks[1] ** 2, axis=2)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.rover.extent import find_reach
+from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.layers import find_changes, have_same_layers
-from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, make_primitives
@@ -98,6 +98,29 @@ class EdgeMemory:
             spacing = site.options.waypoint_spacing
             self._edges = Edges(nodes, make_primitives(site.rover, nodes.cell, spacing))
         return self._edges
+
+
+class CellCounts:
+    """Numbers of marked cells of a map, to tell by one look whether any is near a place."""
+
+    def __init__(self, terrain: Terrain, marked: NDArray[np.bool_]):
+        self._terrain, self._any = terrain, bool(marked.any())
+        ny, nx = marked.shape
+        self._before = np.zeros((ny + 1, nx + 1), np.int32)
+        if self._any:
+            np.cumsum(marked, axis=0, out=self._before[1:, 1:])
+            np.cumsum(self._before, axis=1, out=self._before)
+
+    def are_near(self, places: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
+        """Return (n,) whether a marked cell is within `reach` [m] of places (n, 2) in x or y."""
+        if not self._any:
+            return np.zeros(len(places), bool)
+        cells = (places - self._terrain.origin) / self._terrain.resolution
+        size, far = np.array(self._terrain.elevation.shape[::-1]), reach / self._terrain.resolution
+        x, y = np.clip(np.floor(cells - far), 0, size).astype(int).T
+        right, up = np.clip(np.ceil(cells + far) + 1, 0, size).astype(int).T
+        before = self._before
+        return (before[up, right] - before[y, right] - before[up, x] + before[y, x]) > 0
 
 
 def _is_alike(asked: Site, site: Site) -> bool:

@@ -121,19 +121,25 @@ class PathJudge:
 
         Of several, a first look at some waypoints of each tells which one to choose. That one is
         judged at all its waypoints, with entrapment and its chance of failure, until the one to
-        choose has been. Refused ones are judged up to their first failure.
+        choose has been. Refused ones are judged up to their first failure. If the ground of all
+        that pass is refused, the best of them is explained.
         """
         paths = generate_paths(self.site.rover, start, goal, self.site.options)
         if len(paths) == 1:
             is_on_map = self.site.terrain.contains(*paths[0][-1, :2])
             return choose((self.check(paths[0], stop_at_failure=not is_on_map),))
-        candidates, closely = self._look_at(paths), set[int]()
+        candidates = self._look_at(paths)
+        closely, passing = list[int](), list[int]()
         while (k := choose(tuple(candidates)).choice) not in closely:
-            candidates[k] = self.check(paths[k], stop_at_failure=True)
-            closely.add(k)
+            judged = self._judge_path(paths[k], stop_at_failure=True)
+            candidates[k] = self.site.refuse_ground(judged)
+            closely.append(k)
+            passing += [k] if judged.verdict.traversable else []
+        if passing and not candidates[k].verdict.traversable:
+            k = passing[0]
         if candidates[k].verdict.code == CHANCE:
             candidates[k] = self.check(paths[k])
-        return PathAnswer(tuple(candidates), k)
+        return PathAnswer(tuple(map(self.site.refuse_ground, candidates)), k)
 
     def _look_at(self, paths: list[NDArray[np.float64]]) -> list[Candidate]:
         """Judge paths at waypoints FIRST_LOOK apart, up to the first failure of each."""
@@ -149,8 +155,7 @@ class PathJudge:
             stop_at_failure=True,
             check_entrapment=False,
         )
-        seen = map(Candidate, looks, *zip(*judged, strict=True))
-        return [*map(site.refuse_ground, seen)]
+        return [Candidate(poses, *one) for poses, one in zip(looks, judged, strict=True)]
 
     def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
         """Return whether another goal within `tolerance` [m] may help.

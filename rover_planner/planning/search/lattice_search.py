@@ -126,8 +126,6 @@ class LatticeSearch:
     """Connections from the start to nodes."""
     goals: list[Connection]
     """Connections from nodes to the goal, or to all that are allowed."""
-    doubt: NDArray[np.float32]
-    """(nodes,) doubt that the rover can be at a node, 0 for none; grows with the search."""
     difficulty: Difficulty
     """Estimates how likely edges are refused."""
     progress: SearchProgress = field(default_factory=SearchProgress)
@@ -136,6 +134,8 @@ class LatticeSearch:
     def __post_init__(self) -> None:
         self.ends = _Ends(self.starts), _Ends(self.goals)
         """Judged connections of the start and of the goal."""
+        self.doubt = np.zeros(self.edges.nodes.count, np.float32)
+        """(nodes,) doubt that the rover can be at a node; grows with the search."""
         self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
         self._refused: list[tuple[int, float]] = []
 

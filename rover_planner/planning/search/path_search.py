@@ -28,7 +28,7 @@ from rover_planner.planning.search.connections import (
 )
 from rover_planner.planning.search.difficulty import estimate_difficulty, steepest_climb
 from rover_planner.planning.search.edge_memory import EdgeMemory
-from rover_planner.planning.search.ground_estimate import estimate_ground
+from rover_planner.planning.search.ground_estimate import find_groundless
 from rover_planner.planning.search.judge import PathJudge, cost_of_path
 from rover_planner.planning.search.lattice_search import LatticeSearch, SearchProgress, join_pieces
 from rover_planner.planning.search.nodes import Nodes
@@ -352,20 +352,19 @@ class _PathFinder:
         return found
 
     def _prepare(self) -> LatticeSearch:
-        """Return the search, with the estimates of the ground and the connections of the ends."""
+        """Return the search, with estimates of the ground and the connections of the ends."""
         site, nodes = self._site, self._nodes
         rover, spacing = site.rover, site.options.waypoint_spacing
         edges = self._memory.recall_edges(site, nodes)
         climb = steepest_climb(rover, site.assumed_rover.friction)
         terrain = cut_out(site, nodes) if self._is_limited else site.terrain
-        ground = estimate_ground(rover, terrain, nodes)
-        edges.standing[ground.groundless] = edges.state_of("unknown_ground")
+        groundless = find_groundless(rover, terrain, nodes)
+        edges.standing[groundless] = edges.state_of("unknown_ground")
         return LatticeSearch(
             self._judge,
             edges,
             connect_end(rover, nodes, self._start, spacing, is_goal=False),
-            self._connect_goals(np.flatnonzero(~ground.groundless)),
-            ground.doubt,
+            self._connect_goals(np.flatnonzero(~groundless)),
             estimate_difficulty(rover, terrain, nodes, climb, edges.primitives),
             self.progress,
         )

@@ -5,41 +5,39 @@ Foxglove and ros2 bag read what is written.
 """
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from msg_adapters.errors import MessageError
+from msg_adapters.stamps import NANOSECONDS
 from rover_physics.files.validation import show_file
+from rover_physics.numerics.arrays import Floats
 from rover_planner.errors import PlanningError
+from rover_planner.learning.drive_log import WIDTH, check_rows
+from rover_planner.ros.row_collector import RowCollector
 from rover_planner.shell.extras import find_type, name_type
 
 MAP, JOINTS, ODOMETRY, IMU, PATH = "map", "joints", "odometry", "imu", "path"
 TF, TF_STATIC = "tf", "tf_static"
 """Inputs of a replay; the last two have the topics of the same names."""
 GRID_MAP = "grid_map_msgs/msg/GridMap"
-TYPES: dict[str, tuple[str, ...]] = {
-    MAP: ("sensor_msgs/msg/PointCloud2", GRID_MAP),
-    JOINTS: ("sensor_msgs/msg/JointState",),
-    ODOMETRY: ("nav_msgs/msg/Odometry",),
-    IMU: ("sensor_msgs/msg/Imu",),
-    TF: ("tf2_msgs/msg/TFMessage",),
-    TF_STATIC: ("tf2_msgs/msg/TFMessage",),
-    PATH: ("nav_msgs/msg/Path",),
+INPUTS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    MAP: (("sensor_msgs/msg/PointCloud2", GRID_MAP), ("elevation_cloud", "elevation_map")),
+    JOINTS: (("sensor_msgs/msg/JointState",), ("joint_states",)),
+    ODOMETRY: (("nav_msgs/msg/Odometry",), ("odometry",)),
+    IMU: (("sensor_msgs/msg/Imu",), ("imu",)),
+    TF: (("tf2_msgs/msg/TFMessage",), ()),
+    TF_STATIC: (("tf2_msgs/msg/TFMessage",), ()),
+    PATH: (("nav_msgs/msg/Path",), ("traverse_server/path",)),
 }
-"""Types of each input, as bags name them."""
-USUAL = {
-    MAP: ("elevation_cloud", "elevation_map"),
-    JOINTS: ("joint_states",),
-    ODOMETRY: ("odometry",),
-    IMU: ("imu",),
-    PATH: ("traverse_server/path",),
-}
-"""Usual ends of the topics of each input."""
+"""Types of each input, as bags name them, and usual ends of its topics."""
 GRID_MAP_INFO_FIELDS = """
 float64 resolution
 float64 length_x
@@ -65,7 +63,7 @@ class Recorded:
     """A recorded message."""
 
     kind: str
-    """One of TYPES."""
+    """One of INPUTS."""
     topic: str
     """Its topic."""
     stamp: int
@@ -106,9 +104,9 @@ class BagReader:
 
     def _connections(self) -> list[Any]:
         return [
-            connection
-            for connection in self._reader.connections
-            if connection.msgtype in TYPES.get(self._kinds.get(connection.topic, ""), ())
+            one
+            for one in self._reader.connections
+            if one.topic in self._kinds and one.msgtype in INPUTS[self._kinds[one.topic]][0]
         ]
 
     def _deserialize(self, raw: bytes, name: str) -> Any:
@@ -124,7 +122,7 @@ def open_bag(path: Path, wanted: Mapping[str, str]) -> Iterator[BagReader]:
 
     Args:
         path: The bag.
-        wanted: Topics by input, empty to choose: the one that ends as USUAL, or the only one of
+        wanted: Topics by input, empty to choose: the one that ends as usual, or the only one of
             its type; for IMU and PATH only the former. TF and TF_STATIC are always /tf and
             /tf_static.
 
@@ -137,7 +135,7 @@ def open_bag(path: Path, wanted: Mapping[str, str]) -> Iterator[BagReader]:
     except (ReaderError, OSError, ValueError, KeyError) as error:
         raise PlanningError(f"{show_file(path)}: is no bag that can be read: {error}") from None
     try:
-        topics = {kind: _choose(reader, kind, wanted.get(kind, "")) for kind in TYPES}
+        topics = {kind: _choose(reader, kind, wanted.get(kind, "")) for kind in INPUTS}
         yield BagReader(reader, {kind: topic for kind, topic in topics.items() if topic})
     finally:
         reader.close()
@@ -145,7 +143,7 @@ def open_bag(path: Path, wanted: Mapping[str, str]) -> Iterator[BagReader]:
 
 def _choose(reader: Reader, kind: str, wanted: str) -> str:
     """Return the topic of an input, empty if the bag has none."""
-    names = TYPES[kind]
+    names, ends = INPUTS[kind]
     name = " or ".join(names)
     topics = sorted({c.topic for c in reader.connections if c.msgtype in names and c.msgcount})
     if wanted:
@@ -157,7 +155,7 @@ def _choose(reader: Reader, kind: str, wanted: str) -> str:
         return f"/{wanted.lstrip('/')}"
     if kind in (TF, TF_STATIC):
         return f"/{kind}" if f"/{kind}" in topics else ""
-    usual = [topic for topic in topics if topic.endswith(tuple(f"/{end}" for end in USUAL[kind]))]
+    usual = [topic for topic in topics if topic.endswith(tuple(f"/{end}" for end in ends))]
     candidates = usual if usual or kind in (IMU, PATH) else topics
     if len(candidates) > 1:
         raise PlanningError(
@@ -206,3 +204,32 @@ def write_bag(folder: Path) -> Iterator[BagWriter]:
             yield BagWriter(writer)
     except (WriterError, OSError) as error:
         raise PlanningError(f"{show_file(folder)}: cannot be written: {error}") from None
+
+
+def read_rows(path: Path, odometry_topic: str) -> Floats:
+    """Return the rows (n, WIDTH) of a bag; times are those of the recording, from 0.
+
+    Args:
+        path: The bag, with joint states and with odometry that does not come from the wheels, in
+            the frame of the map.
+        odometry_topic: Topic of this odometry; empty to choose.
+
+    Raises:
+        PlanningError: It cannot be read, or lacks joint states or odometry.
+    """
+    collector, rows, begin = RowCollector(), [], -1
+    with open_bag(path, {ODOMETRY: odometry_topic}) as bag:
+        for kind in (JOINTS, ODOMETRY):
+            if kind not in bag.topics:
+                raise PlanningError(f"{show_file(path)}: has no {kind}")
+        for recorded in bag.messages():
+            begin = recorded.stamp if begin < 0 else begin
+            time = (recorded.stamp - begin) / NANOSECONDS
+            with suppress(MessageError):
+                if recorded.kind == JOINTS:
+                    collector.take_joints(recorded.message, time)
+                elif recorded.kind == IMU:
+                    collector.take_imu(recorded.message, time)
+                elif recorded.kind == ODOMETRY:
+                    rows.append(collector.take_odometry(recorded.message, time, time))
+    return check_rows(np.array(rows).reshape(-1, WIDTH), str(show_file(path)))

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from rover_planner.advice.advise import STOPPED, Advice
-from rover_planner.advice.remedy import Remedy
+from rover_planner.advice.seek import Remedy
 from rover_planner.viewer.state.scenario import Scenario
 
 PROMISED = 20.0

@@ -10,11 +10,10 @@ from typing import Any
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
-from rover_physics.terrain.grid import fingerprint
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.advice.advise import Advice, grow_advice
 from rover_planner.advice.case import case_of
-from rover_planner.advice.remedy import Remedy
+from rover_planner.advice.seek import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.documents import advice, paths
@@ -196,7 +195,7 @@ class Page(PageBase):
     @cached_property
     def _map_print(self) -> str:
         """The fingerprint of the map, computed when it is first asked for."""
-        return fingerprint(self.ground)
+        return self.ground.fingerprint
 
     def _link(self) -> sharing.PageLink:
         """Return the link to what is shown."""

@@ -21,7 +21,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain, fingerprint
+from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.search.site import Site
 from rover_planner.shell.extras import need
@@ -226,7 +226,7 @@ class ShownSurvey:
             raise PlanningError(
                 f"{show_file(path)} is a survey of {what}; name the rover that was surveyed"
             )
-        if terrain is not None and recorded["map"] != fingerprint(terrain):
+        if terrain is not None and recorded["map"] != terrain.fingerprint:
             raise PlanningError(
                 f"{show_file(path)} is a survey of another map, or of one with other gaps; give "
                 "the map and the --max-gap that were surveyed (default 0), or leave TERRAIN out"

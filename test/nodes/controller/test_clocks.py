@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
+from msg_adapters.joints import OWN_NAMES
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
-from rover_planner.nodes.traction.topics import TractionTopics
+from rover_physics.names import WHEEL_JOINTS
+from rover_planner.nodes.traction_topics import TractionTopics
 from support.waiting import wait_until
 
 BOUND = 1.5
@@ -74,7 +76,7 @@ def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, 
 
 
 def test_a_state_that_the_watchdog_tells_late_does_not_stay():
-    topics, told = TractionTopics(Mock(), np.arange(6), np.ones(6)), []
+    topics, told = TractionTopics(Mock(values=Mock(joints=WHEEL_JOINTS)), Mock(), OWN_NAMES), []
     topics.state = Mock(publish=lambda message: told.append(message.data))
 
     def drive():

@@ -144,6 +144,14 @@ def test_a_rover_drives_where_its_wheels_can_pull_and_slides_where_they_cannot(s
     assert found.stalls[0] == 0.0
 
 
+def test_the_resistance_of_soil_that_brakes_a_rover_downhill_is_no_friction_that_it_uses():
+    """It was refused, as all friction was used, where no wheel used half of its own."""
+    found = judge_path(LSR1, plane(-0.2, 0.0), POSE, replace(SERVO, soil="mars_simulant"))[0]
+    used = found.friction_utilisation[0]
+    assert found.speed_share[0] > 0.0 and used.max() < 0.5
+    assert used.min() <= found.friction_share[0] <= used.max()
+
+
 @pytest.mark.parametrize("friction", [0.8, 1.5, 2.0])
 def test_more_friction_does_not_stop_a_rover_with_strong_motors(friction):
     options = replace(SERVO, friction=friction, max_torque=6.0)

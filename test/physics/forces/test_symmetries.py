@@ -61,6 +61,18 @@ def test_mirrored_ground_swaps_right_and_left(seed, curvature):
         assert getattr(there, name) == pytest.approx(expected, abs=tolerance), name
 
 
+def test_bounds_on_mirrored_ground_swap_right_and_left():
+    """They depended on which wheels are first, by up to a hundredth."""
+    ground, poses = smooth(3), random_poses(3, 12, 0.6)
+    flipped, path = mirrored(ground, poses)
+    ahead = np.zeros(len(poses))
+    here = judge_poses(LSR1, with_std(ground, 0.003), poses, ahead)[0].bounds
+    there = judge_poses(LSR1, with_std(flipped, 0.003), path, -ahead)[0].bounds
+    assert here.bounded.all()
+    expected = here.friction_utilisation[:, SWAP]
+    assert there.friction_utilisation == pytest.approx(expected, rel=3e-4)
+
+
 @few
 @given(seeds, st.integers(0, 3), st.tuples(*[st.floats(-50.0, 50.0)] * 3))
 def test_turned_by_quarters_and_moved_with_its_path_the_ground_changes_nothing(

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trapped: holes that a rover can drive into but neither on nor back out of."""
 
-import resource
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path
+from rover_physics.traversability.entrapment import count_steps
 from support.grounds import bowl, make_terrain
 from support.paths import poses_at
 from support.reference_drives import drive_ground
@@ -95,13 +94,8 @@ def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
     assert verdict_on(ground, -4.5, 1.4, LSR1, 0.04, soil="dry_sand").traversable
 
 
-def test_poses_close_together_before_an_edge_do_not_take_the_time_and_the_memory(close=1e-12):
+def test_ways_on_of_poses_close_together_have_no_more_poses_than_usual(close=1e-12):
     edge = make_terrain(lambda x, y: 0.5 * (x > 1.6) - 0.09 * (x > 0.475), half=3.0)
     poses = poses_at([*(-1.0 + close * np.arange(100)), *np.arange(-0.98, 0.7, 0.02)])
-    slippery = SweepOptions(friction=0.4)
-    judge_path(LSR1, edge, poses, slippery)
-    before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
-    verdict = judge_path(LSR1, edge, poses, slippery)[1]
-    assert verdict.code == "trapped"
-    assert time.perf_counter() - began < 60.0
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
+    assert judge_path(LSR1, edge, poses, SweepOptions(friction=0.4))[1].code == "trapped"
+    assert count_steps(poses, 1.2, 0.1) == 60

@@ -101,6 +101,17 @@ CASES = {
 }
 
 
+def test_where_a_rover_fails_and_stays_while_a_wheel_goes_over_an_edge_its_path_ends():
+    ledge = make_terrain(lambda x, y: np.where(x > 0.0, -0.15, 0.0), 0.02, 3.0)
+    way = np.linspace(-0.8, 0.2, 251)
+    whole = judge_path(ROVER, ledge, poses_at(way))[0]
+    row = np.flatnonzero(whole.falling.any(axis=1))[1]
+    limits = replace(ROVER.limits, tilt=0.999 * abs(whole.pitch[row]), wheel_drop=1.0)
+    stays = poses_at(np.insert(way, row + 1, way[row] + 1e-4 * np.linspace(0.0, 1.0, 1500)))
+    verdict = judge_path(replace(ROVER, limits=limits), ledge, stays, stop_at_failure=True)[1]
+    assert (verdict.code, verdict.first_failure) == ("tilt", row)
+
+
 def judge_in_parts(terrain, poses, options):
     """Return the predictions of all parts, and the verdict."""
     judge = PartwiseJudge(ROVER, terrain, poses, options)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rover_physics import Terrain
-from rover_physics.terrain.grid import fingerprint
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.answering.server_health import LATENCIES, OK, WARN, ServerHealth
 from support.grounds import make_terrain, waves
@@ -30,7 +29,7 @@ FLAT = Terrain(np.zeros((30, 30)), 0.1)
 def test_the_longer_of_both_ages_counts_and_the_future_is_told_apart(
     stamp, ros_time, steady, age, told
 ):
-    there = KnownMap(FLAT, FLAT, "a topic", stamp, 0.0, fingerprint(FLAT))
+    there = KnownMap(FLAT, FLAT, "a topic", stamp, 0.0)
     assert there.age(ros_time * SECOND, steady) == pytest.approx(age)
     assert re.search(told, there.describe_age(ros_time * SECOND, steady, 5.0))
 
@@ -60,12 +59,13 @@ def test_any_change_of_a_terrain_changes_its_hash_and_nothing_else_does():
         {"elevation_std": layer},
         {"ground_class": np.ones((30, 30))},
     ]
-    hashes = {fingerprint(one) for one in (FLAT, *(replace(FLAT, **change) for change in changes))}
+    hashes = {one.fingerprint for one in (FLAT, *(replace(FLAT, **change) for change in changes))}
     assert len(hashes) == 1 + len(changes) and {len(text) for text in hashes} == {16}
-    assert fingerprint(Terrain(np.zeros((30, 30), np.float32), 0.1)) == fingerprint(FLAT)
+    assert Terrain(np.zeros((30, 30), np.float32), 0.1).fingerprint == FLAT.fingerprint
+    assert FLAT.fingerprint is FLAT.fingerprint  # found once
     holes = np.zeros((2, 30, 30))
     holes[0, 1, 1], holes[1, 1, 1] = np.nan, -np.nan
-    assert fingerprint(Terrain(holes[0], 0.1)) == fingerprint(Terrain(holes[1], 0.1))
+    assert Terrain(holes[0], 0.1).fingerprint == Terrain(holes[1], 0.1).fingerprint
 
 
 def test_old_latencies_are_forgotten_and_a_lack_of_time_is_a_warning_for_a_while():

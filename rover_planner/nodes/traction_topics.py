@@ -1,22 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The subscriptions of the traction controller: checks messages, prepares maps for its service."""
+"""What /traction_controller hears and what it publishes."""
 
 import time
 from typing import Any
 
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState, PointCloud2
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Float64MultiArray, String
 
-from msg_adapters.commands import twist_to_speeds
+from msg_adapters.commands import doubles, joint_order, labelled_array, twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.joints import read_joint_map
+from msg_adapters.joints import JointNames, read_joint_map
 from msg_adapters.sensors import ImuMounting, imu_to_attitude
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
-from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.traction.map_contacts import MapContactFinder
@@ -28,14 +31,16 @@ from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake, are_gridded_alike
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.polled_topics import Take
-from rover_planner.ros.qos import NEWEST_QOS, TOPIC_QOS, joints_qos
+from rover_planner.ros.qos import LATCHED_QOS, NEWEST_QOS, TOPIC_QOS, joints_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.input_monitor import StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
+    DRIVING,
     IMU,
     JOINT_STATES,
     ODOMETRY,
+    TractionCommand,
     TractionService,
 )
 
@@ -78,12 +83,6 @@ class TractionInputs:
         subscribe_to_map(node, PointCloud2, CLOUD, maps.offer)
         self.publishers = self._subscribe()
         """Looks for publishers that are not heard."""
-
-    def to_robot_steering(self, angles: Floats) -> Floats:
-        """Return angles of the steered wheels [rad], in wheel order, as messages have them."""
-        joints = steering_joints(self._service.settings.rover)
-        names = self.joint_names
-        return names.signs(joints) * (angles - names.offsets(joints))
 
     def _subscribe(self) -> PublisherCheck:
         """Subscribe to all but the map; return what looks for publishers that are not heard."""
@@ -186,3 +185,85 @@ class TractionMaps(MapIntake):
         move = None if source is None else source.matrix
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
         self._ready = MapContactFinder(settings.rover, terrain)
+
+
+STANDING_WHEELS = np.zeros(WHEEL_COUNT)
+"""Rates of wheels that stand [rad/s]."""
+
+
+class TractionTopics:
+    """Publishers of commands, state, brake and forces; any thread may write commands."""
+
+    def __init__(
+        self,
+        node: RoverNode[TractionControllerParameters],
+        service: TractionService,
+        names: JointNames,
+    ):
+        """Create the publishers; joints have these names and signs in messages.
+
+        Raises:
+            MessageError: The parameter joints does not name the wheel joints.
+        """
+
+        def publish(name: str) -> Publisher:
+            return node.create_publisher(Float64MultiArray, name, TOPIC_QOS)
+
+        self._service, self._names = service, names
+        self._order = joint_order(node.values.joints, names)
+        self._signs = names.signs(WHEEL_JOINTS)[self._order]
+        self.commands = publish("~/commands")
+        self._velocities = publish("~/velocity_commands")
+        self._steering = publish("~/steering_commands")
+        self.brake = node.create_publisher(Bool, "~/brake", LATCHED_QOS)
+        self.state = node.create_publisher(String, "~/state", LATCHED_QOS)
+        self.diagnostics = node.create_publisher(DiagnosticArray, "diagnostics", TOPIC_QOS)
+        self._loads = publish("~/wheel_loads")
+        self._used = publish("~/friction_utilisation")
+        self._angles = publish("~/contact_angles")
+        self._last_state: tuple[str, bool] | None = None
+
+    def send(self, command: TractionCommand) -> None:
+        """Publish torques, and rates and steering angles for drives that hold those."""
+        service, names = self._service, self._names
+        if command.state != DRIVING:
+            self.write(command.torques, command.brake, command.state)
+            return
+        self.write(command.torques, command.brake, command.state, service.wanted_rates)
+        if self._steering.get_subscription_count():
+            angles = service.course.steering_aims(service.wanted)
+            if angles is not None:
+                joints = steering_joints(service.settings.rover)
+                told = names.signs(joints) * (angles - names.offsets(joints))
+                self._steering.publish(Float64MultiArray(data=doubles(told)))
+
+    def write(
+        self, torques: Floats, brake: bool, state: str, rates: Floats = STANDING_WHEELS
+    ) -> None:
+        """Publish torques (6,) [N m] and rates (6,) [rad/s]; brake and state if changed."""
+        if self._velocities.get_subscription_count():
+            self._velocities.publish(self._to_message(rates))
+        self.commands.publish(self._to_message(torques))
+        if self._last_state != (state, brake):
+            told = self._last_state = state, brake
+            self.brake.publish(Bool(data=brake))
+            self.state.publish(String(data=state))
+            if self._last_state is not told:  # another thread wrote meanwhile: which came last?
+                self._last_state = None
+
+    def _to_message(self, values: Floats) -> Float64MultiArray:
+        """Return values of the wheels (6,) in the order and with the signs of messages."""
+        return Float64MultiArray(data=doubles(self._signs * values[self._order]))
+
+    def publish_forces(self, command: TractionCommand) -> None:
+        """Publish loads, utilisation and contact angles of a rover that drives, to who listens."""
+        estimate, answer = command.estimate, command.answer
+        if estimate is None or answer is None:
+            return
+        for publisher, values in ((self._loads, answer.loads), (self._used, answer.utilisation)):
+            if publisher.get_subscription_count():
+                publisher.publish(labelled_array(values, "wheel"))
+        if self._angles.get_subscription_count():
+            deviations = np.sqrt(estimate.covariance.diagonal())
+            contacts = np.array([estimate.angles, deviations])
+            self._angles.publish(labelled_array(contacts, "angle, deviation", "wheel"))
