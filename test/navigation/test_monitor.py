@@ -8,6 +8,7 @@ import pytest
 
 from rover_planner.planning.answering.judgement import SuspensionReport
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.navigation.monitor import (
@@ -17,7 +18,6 @@ from rover_planner.planning.navigation.monitor import (
     WATCHING,
     PathMonitor,
     Sight,
-    SuspensionDrift,
     describe_watch,
 )
 from rover_planner.planning.navigation.watched_path import USUAL_RADIUS, WatchedPath
@@ -177,18 +177,19 @@ def test_joint_states_that_cease_stop_a_rover_that_had_them(service, monitor):
     assert (found.state, found.judgement.code) == (STOPPED, "no_joints")
 
 
-def test_a_difference_counts_once_it_has_lasted():
-    drift = SuspensionDrift(1.0)
-    assert drift.latest == {} and drift.lasting() == 0.0
-    for k in range(11):
-        size = 0.4 if k != 5 else 0.1
-        drift.take(SuspensionReport({"bogie_left": -size, "bogie_right": 0.0}, False), 0.1 * k)
-    assert drift.lasting() == pytest.approx(0.1)
-    for k in range(11, 18):
-        drift.take(SuspensionReport({"bogie_left": -0.4}, False), 0.1 * k)
-    assert drift.lasting() == pytest.approx(0.4) and drift.latest == {"bogie_left": -0.4}
-    drift.take(None, 9.0)
-    assert drift.latest == {} and drift.lasting() == 0.0
+def test_a_difference_counts_once_it_has_lasted(service, monitor, monkeypatch):
+    def look(time, size=None):
+        report = size and SuspensionReport({"bogie_left": -size, "bogie_right": 0.0}, False)
+        monkeypatch.setattr(Snapshot, "compare_standing", lambda _: report)
+        return monitor.look(sight(service, STRAIGHT[0], time))
+
+    for k in range(16):
+        assert look(0.1 * k, 0.1 if k == 5 else 0.4).state == WATCHING
+    found = look(1.6, 0.4)
+    assert (found.state, found.judgement.code) == (STOPPED, "suspension")
+    assert "-0.400 rad at bogie_left" in found.judgement.reason
+    assert look(1.9).mismatch["bogie_left"] == -0.4
+    assert look(9.0).mismatch == {}
 
 
 def test_health_tells_a_stop_then_drift_with_its_size(service, monitor):

@@ -51,7 +51,6 @@ class TraverseService:
         """Places that are impassable, for new questions."""
         self._edge_memory = EdgeMemory()
         self._ground: LearnedGround | None = None
-        self._assumed: tuple[ServiceSettings, LearnedGround | None, ServiceSettings] | None = None
         self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
         self._joints: dict[str, Measured] = {}
         self._pose: Measured | None = None
@@ -172,7 +171,7 @@ class TraverseService:
         """
         ground = None if self.settings.parameters.learn == OFF else self._ground
         known = Snapshot(
-            self._settings_on(ground),
+            self.settings.on_ground(ground),
             self.given_path,
             self.joints,
             measured_pose=self.pose_with_suspension(),
@@ -181,16 +180,6 @@ class TraverseService:
             marked=self.marked,
         )
         return self.add_map(known, ros_time)
-
-    def _settings_on(self, ground: LearnedGround | None) -> ServiceSettings:
-        """Return the settings of new questions: the same object until they or the ground change.
-
-        The watch judges again where they are another one.
-        """
-        last = self._assumed
-        if last is None or last[0] is not self.settings or last[1] is not ground:
-            last = self._assumed = self.settings, ground, self.settings.on_ground(ground)
-        return last[2]
 
     def add_map(self, snapshot: Snapshot, ros_time: int | None = None) -> Snapshot:
         """Return a snapshot with the present map; `ros_time` as for `snapshot`."""

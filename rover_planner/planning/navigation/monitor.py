@@ -3,8 +3,6 @@
 
 import math
 import time
-from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +12,7 @@ from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.answering.judgement import PathJudgement, SuspensionReport, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
@@ -73,33 +71,6 @@ class Finding:
         return max((abs(value) for value in self.mismatch.values()), default=math.nan)
 
 
-class SuspensionDrift:
-    """The differences of measured and predicted suspension angles in the last seconds."""
-
-    def __init__(self, seconds: float):
-        """Keep the differences of so many seconds."""
-        self._seconds = seconds
-        self._kept: deque[tuple[float, Mapping[str, float]]] = deque()
-
-    def take(self, report: SuspensionReport | None, now: float) -> None:
-        """Keep a comparison made at time `now` [s]; None if there was none."""
-        if report is not None:
-            self._kept.append((now, report.suspension_mismatch))
-        while self._kept and now - self._kept[0][0] > self._seconds:
-            self._kept.popleft()
-
-    @property
-    def latest(self) -> Mapping[str, float]:
-        """The last difference, measured minus predicted, by joint [rad]; empty without one."""
-        return self._kept[-1][1] if self._kept else {}
-
-    def lasting(self) -> float:
-        """Return the size that was exceeded all the time [rad]; 0 before the time is over."""
-        if not self._kept or self._kept[-1][0] - self._kept[0][0] < 0.8 * self._seconds:
-            return 0.0
-        return min(max(abs(value) for value in kept.values()) for _, kept in self._kept)
-
-
 class PathMonitor:
     """Watches the path that was accepted last; after a stop it waits for the next one.
 
@@ -108,11 +79,10 @@ class PathMonitor:
 
     def __init__(self) -> None:
         self._path: WatchedPath | None = None
-        self._drift = SuspensionDrift(DRIFT_TIME)
         self.finding = Finding(IDLE)
         """The last finding."""
         self._judged_on: tuple[Terrain | None, ServiceSettings, MarkedPlaces] | None = None
-        self._pose_time = 0.0
+        self._pose_time = self._compared_time = self._agreed_time = 0.0
         self._joints_time: float | None = None
         self._pause_end = 0.0
 
@@ -127,9 +97,8 @@ class PathMonitor:
             place = path.find_place(sight.pose, wheel_radius=settings.rover.wheel.radius)
             if place.offset > settings.monitor_offset:
                 return False
-        self._path, self._judged_on, self._pose_time = path, None, sight.time
-        self._joints_time = None
-        self._drift = SuspensionDrift(DRIFT_TIME)
+        self._path, self._judged_on, self._joints_time = path, None, None
+        self._pose_time = self._agreed_time = sight.time
         self.finding = Finding(WATCHING, path.hash)
         return True
 
@@ -198,15 +167,20 @@ class PathMonitor:
 
     def _compare_suspension(self, sight: Sight) -> None:
         """Compare measured and predicted suspension where the rover stands."""
-        self._drift.take(sight.snapshot.compare_standing(), sight.time)
-        self.finding = replace(self.finding, mismatch=dict(self._drift.latest))
+        report = sight.snapshot.compare_standing()
+        if report is not None:
+            self.finding = replace(self.finding, mismatch=dict(report.suspension_mismatch))
+            self._compared_time = sight.time
+        elif sight.time - self._compared_time > DRIFT_TIME:
+            self.finding = replace(self.finding, mismatch={})
+        if not self.finding.drift > sight.snapshot.settings.parameters.monitor_mismatch:
+            self._agreed_time = sight.time
 
     def _refuse_drift(self, sight: Sight) -> PathJudgement | None:
         """Return a refusal if the suspension has differed too much for some time."""
-        most, lasting = sight.snapshot.settings.parameters.monitor_mismatch, self._drift.lasting()
-        if not 0.0 < most < lasting:
+        most, latest = sight.snapshot.settings.parameters.monitor_mismatch, self.finding.mismatch
+        if most == 0.0 or sight.time - self._agreed_time <= DRIFT_TIME:
             return None
-        latest = self._drift.latest
         joint = max(latest, key=lambda name: abs(latest[name]))
         reason = (
             f"measured and predicted suspension differ by {latest[joint]:+.3f} rad at {joint}, "
@@ -222,9 +196,7 @@ class PathMonitor:
             return missing
         judged_on = snapshot.terrain, snapshot.settings, snapshot.marked
         before = self._judged_on
-        if before is not None and all(a is b for a, b in zip(before, judged_on, strict=True)):
-            return None
-        if before is not None and sight.time < self._pause_end:
+        if before is not None and (before == judged_on or sight.time < self._pause_end):
             return None
         begin = time.monotonic()
         judgement = self._check_rest(path, snapshot)
