@@ -106,6 +106,12 @@ def look_into_cell(search, corner, heading, shape):
     rise = rate * cosine - gain * s0
     low, high = s0 + min(ex, 0.0) + min(ey, 0.0), s0 + max(ex, 0.0) + max(ey, 0.0)
     low, high = max(low, -FIRST * R), min(high, FIRST * R)
+    # There u = (s - s0 - place) / (2 ex) and v = (s - s0 + place) / (2 ey), from 0 to 1.
+    place = slope_t / d
+    low = max(low, s0 + max(place + min(2.0 * ex, 0.0), min(2.0 * ey, 0.0) - place))
+    high = min(high, s0 + min(place + max(2.0 * ex, 0.0), max(2.0 * ey, 0.0) - place))
+    if not low <= high:
+        return
     starts = 0.5 * (low + high), np.nan
     if gain * R > 1.0:  # The wheel bends less than the ground: peaks are on its steep sides.
         starts = low, high
