@@ -20,7 +20,7 @@ LEVEL = 1e-9
 LEAST_Q = 0.01
 """Least height below the axle [radii]."""
 FIRST = 0.95
-"""Largest share of the radius at which the search of a rim begins."""
+"""Largest share of the radius at which a search begins."""
 RIM_STEPS = 4
 """Largest number of places of a rim that this search looks at."""
 FOUND = 1e-4
@@ -29,12 +29,9 @@ MISSED = 0.1
 """Turn [rad] by which a straight line may miss a cell that the bent rim crosses."""
 BEYOND = 1e-4
 """Distance from the cell [cells] up to which a place counts as in it."""
-INTERIOR_STEPS = 8
-"""Largest number of steps of the search inside a cell."""
-FLAT_RATE = 3e-3
-"""Change of the intrusion along the heading at which that search stops."""
-STEEPEST = 0.9999
-"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
+INTERIOR_STEPS, FLAT_RATE = 8, 3e-3
+"""Largest number of steps of the search inside a cell, and change of the intrusion along the
+heading at which it stops."""
 LEAST_CHANGE = 0.3
 """Lower bound of the derivative in both searches, where the ground bends almost like the wheel."""
 
@@ -100,117 +97,47 @@ def look_into_cell(search, corner, heading, shape):
     """Search a twisted cell for a peak of the intrusion in its inside.
 
     Across the wheel the ground bends down, so for each s there is a best t in closed form. What is
-    left is a quadratic function of s plus the wheel's dome; its largest value is bracketed.
-
-    Args:
-        search: CELL_SEARCH.
-        corner: s and t of a corner of the cell [cells].
-        heading: The heading along its sides u and v, which begin at the corner, u right of v.
-        shape: (a, b, c, d) of the ground a + b u + c v + d u v above the wheel's centre, u and v
-            along the cell's sides from the corner [cells].
+    left is a quadratic function of s plus the wheel's dome. Arguments are as for `look_along_rim`.
     """
-    (ex, ey), R, inverse = heading, search.radius, 1.0 / search.cosine
-    s0, t0 = corner
-    a, b, c, d = shape
-    sag, skew = d * ex * ey, d * (ex * ex - ey * ey)
-    slope_s, slope_t = b * ex + c * ey, c * ex - b * ey - search.tangent
-    least, most = span_of_peaks(slope_t / d, ex, ey)
-    if not least <= most:
+    (s0, t0), (ex, ey), (a, b, c, d) = corner, heading, shape
+    R, cosine, half = search.radius, search.cosine, 0.5 / (d * ex * ey)
+    slope_t, skew, gain = c * ex - b * ey, d * (ex * ex - ey * ey), d * d * half * cosine
+    level, rate = a + 0.5 * slope_t * slope_t * half, b * ex + c * ey + slope_t * skew * half
+    rise = rate * cosine - gain * s0
+    low, high = s0 + min(ex, 0.0) + min(ey, 0.0), s0 + max(ex, 0.0) + max(ey, 0.0)
+    low, high = max(low, -FIRST * R), min(high, FIRST * R)
+    # There u = (s - s0 - place) / (2 ex) and v = (s - s0 + place) / (2 ey), from 0 to 1.
+    place = slope_t / d
+    low = max(low, s0 + max(place + min(2.0 * ex, 0.0), min(2.0 * ey, 0.0) - place))
+    high = min(high, s0 + min(place + max(2.0 * ex, 0.0), max(2.0 * ey, 0.0) - place))
+    if not low <= high:
         return
-    half = 0.5 / sag
-    bend = 0.5 * d * d * half
-    rise = slope_s + slope_t * skew * half
-    base = a - search.tangent * t0 + 0.5 * slope_t * slope_t * half
-    level = base - rise * s0 + bend * s0 * s0
-    rise -= 2.0 * bend * s0
-    low = max(s0 + min(ex, 0.0) + min(ey, 0.0), -STEEPEST * R)
-    high = min(s0 + max(ex, 0.0) + max(ey, 0.0), STEEPEST * R)
-    if not low < high:
-        return
-    # The wheel bends at least as at its bottom.
-    rest = inverse / R - 2.0 * bend
-    if rest > 0.0:
-        at = min(max(rise / rest, low), high)
-        if level + R * inverse + (rise - 0.5 * rest * at) * at <= search.best:
+    starts = 0.5 * (low + high), np.nan
+    if gain * R > 1.0:  # The wheel bends less than the ground: peaks are on its steep sides.
+        starts = low, high
+    else:  # It bends at least as at its bottom.
+        at = min(max(rise / (1.0 / R - gain), low), high)
+        along = at - s0
+        most = (level + rate * along) * cosine + 0.5 * gain * along * along + R - 0.5 * at * at / R
+        if most <= search.best * cosine:
             return
-    least, most = max(s0 + least, low), min(s0 + most, high)
-    if not least <= most:
-        return
-    at = min(max(rise / rest, least), most) if rest > 0.0 else least
-    highest = max((rise - 0.5 * rest * at) * at, (rise - 0.5 * rest * most) * most)
-    if level + R * inverse + highest < search.best - ROUNDING:
-        return
-    if rest > 0.0:
-        _look_on_line(search, corner, heading, shape, (rise, bend, low, high))
-        return
-    # Only where the wheel bends more than the ground there are peaks: on its steep sides.
-    q = (0.5 * R * R * inverse / bend) ** (1.0 / 3.0)
-    inflection = np.sqrt(max(R * R - q * q, 0.0))
-    if high > inflection:
-        _look_on_line(search, corner, heading, shape, (rise, bend, max(low, inflection), high))
-    if low < -inflection:
-        _look_on_line(search, corner, heading, shape, (rise, bend, low, min(high, -inflection)))
-
-
-@kernel
-def span_of_peaks(place, ex, ey):
-    """Return the least and largest distance along s from a cell's corner at which a peak may be.
-
-    On the line of best t the place along x is (distance - place) / (2 ex), that along y
-    (distance + place) / (2 ey); both are between 0 and 1 in the cell.
-
-    Args:
-        place: Slope of the ground across the heading at the corner, over the twist [cells].
-        ex: Heading along x; neither this nor the next may be 0.
-        ey: Heading along y.
-    """
-    least = max(place + min(2.0 * ex, 0.0), min(2.0 * ey, 0.0) - place)
-    most = min(place + max(2.0 * ex, 0.0), max(2.0 * ey, 0.0) - place)
-    return least - ROUNDING, most + ROUNDING
-
-
-@kernel
-def _look_on_line(search, corner, heading, shape, line):
-    """Find the peak on the line of best t in a cell, and keep it if it is in the cell.
-
-    Args:
-        search: CELL_SEARCH.
-        corner: As for `look_into_cell`, as are heading and shape.
-        heading: Above.
-        shape: Above.
-        line: Slope and half the second derivative of the ground along the line, and the least and
-            largest s.
-    """
-    (ex, ey), R, inverse = heading, search.radius, 1.0 / search.cosine
-    s0, t0 = corner
-    a, b, c, d = shape
-    rise, bend, low, high = line
-    low_rate = rise + 2.0 * bend * low - low / np.sqrt(R * R - low * low) * inverse
-    high_rate = rise + 2.0 * bend * high - high / np.sqrt(R * R - high * high) * inverse
-    if not (low_rate > 0.0 and high_rate < 0.0):
-        return
-    # The unknown is the wheel's slope s / q, which makes steep contacts well-behaved.
-    gain, cosine = 2.0 * bend * search.cosine, search.cosine
-    s = 0.5 * (low + high)
-    slope = s / np.sqrt(R * R - s * s)
-    for _ in range(INTERIOR_STEPS):
-        inverse_length = 1.0 / np.sqrt(1.0 + slope * slope)
-        s = R * slope * inverse_length
-        error = rise * cosine + gain * s - slope
-        if abs(error) < FLAT_RATE:
+    for start in starts:
+        if not abs(start) < R:
             break
-        change = 1.0 - gain * R * inverse_length * inverse_length * inverse_length
-        slope += error / max(change, LEAST_CHANGE)
-    half = 0.5 / (d * ex * ey)
-    slope_t, skew = c * ex - b * ey - search.tangent, d * (ex * ex - ey * ey)
-    along = s - s0
-    aside = (slope_t + skew * along) * half
-    u, v = ex * along - ey * aside, ey * along + ex * aside
-    if not (u >= 0.0 and u <= 1.0 and v >= 0.0 and v <= 1.0):
-        return
-    if is_below(search, s, t0 + aside):
-        ground = a + b * u + c * v + d * u * v
-        take_point(search, s, t0 + aside, ground - search.tangent * (t0 + aside))
+        # The unknown is the wheel's slope s / q, which makes steep contacts well-behaved.
+        s, slope = start, start / np.sqrt(R * R - start * start)
+        for _ in range(INTERIOR_STEPS):
+            inverse_length = 1.0 / np.sqrt(1.0 + slope * slope)
+            s = R * slope * inverse_length
+            error = rise + gain * s - slope
+            if abs(error) < FLAT_RATE:
+                break
+            change = 1.0 - gain * R * inverse_length * inverse_length * inverse_length
+            slope += error / max(change, LEAST_CHANGE)
+        aside = (slope_t + skew * (s - s0)) * half
+        u, v = ex * (s - s0) - ey * aside, ey * (s - s0) + ex * aside
+        if min(u, v) >= 0.0 and max(u, v) <= 1.0 and is_below(search, s, t0 + aside):
+            take_point(search, s, t0 + aside, a + b * u + c * v + d * u * v)
 
 
 @kernel

@@ -187,7 +187,7 @@ def _look_around(ground, search, vertex, there):
 @kernel
 def _look_at_cell(search, corner, heading, shape):
     """Search the rims in a cell, and its inside if it is twisted; as `look_along_rim` does."""
-    (ex, ey), (a, b, c, d), t = heading, shape, corner[1]
+    (ex, ey), d, t = heading, shape[3], corner[1]
     low, high = t + min(ex, 0.0) - max(ey, 0.0), t + max(ex, 0.0) - min(ey, 0.0)
     if is_beside(search, low, high):
         return
@@ -196,9 +196,7 @@ def _look_at_cell(search, corner, heading, shape):
         if low < side + max(lean, 0.0) and high > side + min(lean, 0.0):
             look_along_rim(search, rim, corner, heading, shape)
     if d * ex * ey * 0.5 > NOTICED * search.radius:
-        tangent = search.tangent
-        ground = a + tangent * t, b - tangent * ey, c + tangent * ex, d
-        look_into_cell(search, corner, heading, ground)
+        look_into_cell(search, corner, heading, shape)
 
 
 @kernel

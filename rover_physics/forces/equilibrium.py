@@ -35,11 +35,7 @@ BALANCE = record_type(
     ("A", float, (UNKNOWNS, UNKNOWNS)),  # work space: the equations
     ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
     ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
-    (
-        "units",
-        float,
-        (6, 3, UNKNOWNS),
-    ),  # terms of unit forces N, T, S of each wheel in the equations
+    ("units", float, (6, 3, UNKNOWNS)),  # terms of unit forces N, T, S of each wheel
     ("shares", SHARES),  # shares of the wheels in the common forces
 )
 """Forces of a settled rover as linear functions of its free forces, over the rover's weight.
@@ -125,7 +121,7 @@ def write_equations(linkage, placement, contacts, columns, balance):
             B[row, k] = -units[wheel, kind, row]
     _add_weights(linkage, placement, B)
     if linkage.has_tool_load:
-        _add_tool_load(linkage, placement, B)
+        add_body_load(linkage, placement, linkage.tool, B)
 
 
 @kernel
@@ -179,11 +175,14 @@ def _add_weights(linkage, placement, B):
 
 
 @kernel
-def _add_tool_load(linkage, placement, B):
-    """Add the tool's force and moment to the right-hand side; they act on the body."""
+def add_body_load(linkage, placement, tool, B):
+    """Add a force and a moment on the body, such as the tool's, to the right-hand side.
+
+    `tool` is (3, 3): where the force acts [m], force [N] and moment [N m], body frame.
+    """
     weight = linkage.mass * linkage.gravity
     for i in range(3):
-        force, moment = tool_load(placement.R, linkage.tool, i)
+        force, moment = tool_load(placement.R, tool, i)
         B[i, 0] -= force / weight
         B[3 + i, 0] -= moment / (weight * linkage.length)
 

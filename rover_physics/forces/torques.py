@@ -19,7 +19,7 @@ import numpy as np
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.forces.soil import use_of_shear
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_algebra import solve_in_place
+from rover_physics.numerics.linear_algebra import dot, solve_in_place
 from rover_physics.numerics.records import record_type
 
 MAX_LEVELS = 60
@@ -204,59 +204,45 @@ def _write_barrier(balance, free, goal, level, search):
     if goal != SearchGoal.FRICTION:
         for k in range(free):
             search.H[k, k], search.g[k, 0] = TETHER, TETHER * search.y[k]
-    traction = level if goal == SearchGoal.TORQUE else search.max_traction
+    n, t, s = balance.normal, balance.tangential, balance.lateral
     for i in range(6):
-        if goal == SearchGoal.FRICTION:
-            _add_cone(balance, free, i, level, search)
-        else:
-            room = search.wheel_loads[i] + (level if goal == SearchGoal.LOAD else 0.0)
-            _add_log(balance, free, i, 1.0, 0.0, 1.0 / room, 1.0 / (room * room), search)
-        if traction < np.inf:
-            thrust = _thrust(search, i)
-            above, below = traction - thrust, traction + thrust
-            slope = 1.0 / below - 1.0 / above
-            curvature = 1.0 / (below * below) + 1.0 / (above * above)
-            _add_log(balance, free, i, search.resistance[i], 1.0, slope, curvature, search)
-
+        (of_N, of_T, of_S), (NN, NT, NS, TT, TS, SS) = _bend_at(search, i, goal, level)
+        for j in range(free):
+            N, T, S = n[i, 1 + j], t[i, 1 + j], s[i, 1 + j]
+            search.g[j, 0] += of_N * N + of_T * T + of_S * S
+            row = NN * N + NT * T + NS * S, NT * N + TT * T + TS * S, NS * N + TS * T + SS * S
+            for k in range(j + 1):
+                search.H[j, k] += dot(row, (n[i, 1 + k], t[i, 1 + k], s[i, 1 + k]))
     for j in range(free):
         for k in range(j):
             search.H[k, j] = search.H[j, k]
 
 
 @kernel
-def _add_log(balance, free, i, of_load, of_traction, slope, curvature, search):
-    """Add the barrier -log of a linear slack of wheel i; only the lower half of H.
+def _bend_at(search, i, goal, level):
+    """Return gradient and Hessian of the barrier of wheel i by its N, T and S.
 
-    `of_load` and `of_traction` are the shares of N and T in it; slope and curvature are those of
-    the barrier.
+    The barrier is the sum of -log of the slacks: of the load or, for FRICTION, of the cone,
+    (u mu N)^2 - (T + u R)^2 - S^2 at level u, and of the torque, T + R to either side. For a wheel
+    that others drag, R has no factor u in the cone.
     """
-    n, t = balance.normal, balance.tangential
-    for j in range(free):
-        row = of_load * n[i, 1 + j] + of_traction * t[i, 1 + j]
-        search.g[j, 0] -= slope * row
-        for k in range(j + 1):
-            other = of_load * n[i, 1 + k] + of_traction * t[i, 1 + k]
-            search.H[j, k] += curvature * row * other
-
-
-@kernel
-def _add_cone(balance, free, i, level, search):
-    """Add the barrier -log((u mu N)^2 - (T + u R)^2 - S^2) of wheel i at level u.
-
-    Only the lower half of H is written. For a wheel that others drag, R has no factor u.
-    """
-    n, t, s = balance.normal, balance.tangential, balance.lateral
-    mu, back = level * search.mu[i], search.resistance[i]
-    if _pulls_itself(search, i):
-        back *= level
-    N, S = search.wheel_loads[i], search.lateral[i]
-    T = search.tangential[i] + back * N
-    room = mu * mu * N * N - T * T - S * S
-    for j in range(free):
-        nj, tj, sj = mu * mu * n[i, 1 + j], t[i, 1 + j] + back * n[i, 1 + j], s[i, 1 + j]
-        gj = 2.0 * (N * nj - T * tj - S * sj) / room
-        search.g[j, 0] -= gj
-        for k in range(j + 1):
-            nk, tk, sk = n[i, 1 + k], t[i, 1 + k] + back * n[i, 1 + k], s[i, 1 + k]
-            gk = 2.0 * (mu * mu * N * nk - T * tk - S * sk) / room
-            search.H[j, k] += gj * gk - 2.0 * (nj * nk - tj * tk - sj * sk) / room
+    N, S, back = search.wheel_loads[i], search.lateral[i], search.resistance[i]
+    of_N = of_T = NN = NT = TT = 0.0
+    traction = level if goal == SearchGoal.TORQUE else search.max_traction
+    if traction < np.inf:
+        thrust = _thrust(search, i)
+        above, below = 1.0 / (traction - thrust), 1.0 / (traction + thrust)
+        of_T, TT = above - below, above * above + below * below
+        of_N, NN, NT = back * of_T, back * back * TT, back * TT
+    if goal != SearchGoal.FRICTION:
+        room = N + (level if goal == SearchGoal.LOAD else 0.0)
+        return (of_N - 1.0 / room, of_T, 0.0), (NN + 1.0 / (room * room), NT, 0.0, TT, 0.0, 0.0)
+    back *= level if _pulls_itself(search, i) else 1.0
+    T, square = search.tangential[i] + back * N, (level * search.mu[i]) ** 2
+    half = 0.5 * (square * N * N - T * T - S * S)
+    by_N, by_T, by_S = (back * T - square * N) / half, T / half, S / half
+    NN += by_N * by_N + (back * back - square) / half
+    NT += by_N * by_T + back / half
+    TT += by_T * by_T + 1.0 / half
+    SS = by_S * by_S + 1.0 / half
+    return (of_N + by_N, of_T + by_T, by_S), (NN, NT, by_N * by_S, TT, by_T * by_S, SS)

@@ -22,6 +22,7 @@ from rover_physics.errors import ModelError
 from rover_physics.forces.equilibrium import (
     BALANCE,
     FREE_TORQUES,
+    add_body_load,
     solve_equations,
     write_equations,
 )
@@ -55,20 +56,11 @@ TRACTIONS = slice(TRACTION, TRACTION + WHEEL_COUNT)
 LOADS = slice(LOAD, LOAD + WHEEL_COUNT)
 """The six loads."""
 
-# Equations of the balance. The first six determine the loads of the wheels.
-LATERAL_SHARE_EQUATION = LATERAL_SHARE - LOAD
-"""The equation that determines s0."""
-LATERAL_SLOPE_EQUATION = LATERAL_SLOPE - LOAD
-"""The equation that determines s1."""
-TRACTION_EQUATION = LATERAL_SLOPE_EQUATION + 1
+# Equations of the balance. Each but the last determines a force: the one at LOAD + its number.
+TRACTION_EQUATION = FORCES - LOAD
 """The equation that determines the traction of LAST_WHEEL, by the principle of virtual work."""
 EQUATIONS = TRACTION_EQUATION + 1
 """Number of equations of the balance."""
-
-FORCE_ROW, MOMENT_ROW = 0, 3
-"""First row of the forces and of the moments in the equations of `equilibrium`."""
-FIRST_LATERAL, COMMON_TRACTION = 6, 8
-"""Rows of the two lateral terms and of the common traction in the solution of `equilibrium`."""
 
 LEAST_LOAD = 0.1
 """Smallest load over the mean load by which a wheel shares lateral forces."""
@@ -180,6 +172,7 @@ BALANCE_WORK = record_type(
     ("contacts", CONTACTS),
     ("balance", BALANCE),
     ("rolling", ROLLING),
+    ("load", float, (3, 3)),  # the push as a load on the body, as for `add_body_load`
 )
 """Input and work space of `BalanceWriter`."""
 
@@ -335,17 +328,12 @@ def _add_push(linkage, work):
     It acts on the body at the centre of mass, against the acceleration of the rolling motion:
     straight ahead along body -x, in a curve with a moment about body z.
     """
-    R, com, B, thrust = work.placement.R, work.com, work.balance.B, work.rolling.thrust
-    weight = linkage.mass * linkage.gravity
-    ahead = -work.measured.push * thrust[0]
-    left = -work.measured.push * thrust[1]
-    moment_x = -com[2] * left
-    moment_y = com[2] * ahead
-    moment_z = com[0] * left - com[1] * ahead - work.measured.push * thrust[2]
-    for i in range(3):
-        B[FORCE_ROW + i, 0] -= (R[i, 0] * ahead + R[i, 1] * left) / weight
-        moment = R[i, 2] * moment_z + R[i, 1] * moment_y + R[i, 0] * moment_x
-        B[MOMENT_ROW + i, 0] -= moment / (weight * linkage.length)
+    push, com, thrust = work.measured.push, work.com, work.rolling.thrust
+    load = work.load
+    load[0, 0], load[0, 1], load[0, 2] = com[0], com[1], com[2]
+    load[1, 0], load[1, 1] = -push * thrust[0], -push * thrust[1]
+    load[2, 2] = -push * thrust[2]
+    add_body_load(linkage, work.placement, load, work.balance.B)
 
 
 @kernel
@@ -361,22 +349,14 @@ def _write_rows(balance, rows):
         for term in range(2):
             rows.lateral_shares[wheel, term] = common[wheel, term]
     last = common[LAST_WHEEL, 2]
-    for column in range(1 + FREE_TORQUES):
-        for row in range(EQUATIONS):
-            if row < LATERAL_SHARE_EQUATION:
-                value = balance.normal[row, column]
-                A[row, LOAD + row] = 1.0
-            elif row < TRACTION_EQUATION:
-                term = row - LATERAL_SHARE_EQUATION
-                value = balance.B[FIRST_LATERAL + term, column]
-                A[row, LATERAL_SHARE + term] = 1.0
-            else:
-                value = balance.B[COMMON_TRACTION, column]
-            if column == 0:
-                b[row] = WHEEL_COUNT * value
-            else:
-                A[row, TRACTION + column - 1] = -value
-                A[row, LAST_WHEEL] += value * common[column - 1, 2] * last
+    for row in range(EQUATIONS):
+        b[row] = WHEEL_COUNT * balance.B[row, 0]
+        for wheel in range(FREE_TORQUES):
+            value = balance.B[row, 1 + wheel]
+            A[row, TRACTION + wheel] = -value
+            A[row, LAST_WHEEL] += value * common[wheel, 2] * last
+        if row < TRACTION_EQUATION:
+            A[row, LOAD + row] = 1.0
     A[TRACTION_EQUATION, LAST_WHEEL] += last
 
 

@@ -61,12 +61,9 @@ CONVERGED_SHARE = 0.02
 """Change of the scaled tractions, which are of order one, at which a sequence has converged."""
 OSQP_SOLVED = 1
 """OSQP's status_val of a solved problem; the first versions have no name for it."""
-LINE_END = 1.5
-"""Where the search along a line ends; 0 is at the last forces and 1 at the answer."""
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""The golden section."""
-SECTIONS = 10
-"""Sections of the search; they find the best place to within 1 % of the line."""
+LINE_STEPS, PLACES = 20, 31
+"""Steps from the last forces to an answer, and number of places on the line that are looked at;
+some are beyond the answer."""
 ROUNDING = 1e-4
 """Share of the largest pull by which OSQP may exceed it."""
 
@@ -230,7 +227,7 @@ def _measure_peak(shares, friction, x):
 
 @kernel
 def _search_line(shares, friction, max_pull, points):
-    """Write the forces of the smallest cost, by golden section; return how far tractions moved.
+    """Write the forces of the smallest cost at places on a line; return how far tractions moved.
 
     Args:
         shares: (6, 2) `lateral_shares` of the balance.
@@ -246,24 +243,11 @@ def _search_line(shares, friction, max_pull, points):
         mean_friction += friction[wheel] / WHEEL_COUNT
     peak_unit = max(_measure_peak(shares, friction, start), MIN_PEAK)
     units = max_pull, peak_unit, peak_unit * mean_friction
-    low, high = 0.0, LINE_END
-    a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    cost_a = _cost_at(a, shares, friction, points, units)
-    cost_b = _cost_at(b, shares, friction, points, units)
-    for _ in range(SECTIONS):
-        if cost_a <= cost_b:
-            high, b, cost_b = b, a, cost_a
-            a = high - GOLDEN * (high - low)
-            cost_a = _cost_at(a, shares, friction, points, units)
-        else:
-            low, a, cost_a = a, b, cost_b
-            b = low + GOLDEN * (high - low)
-            cost_b = _cost_at(b, shares, friction, points, units)
-    place, least = 0.5 * (low + high), np.inf
-    for candidate in (0.0, place, 1.0):
-        cost = _cost_at(candidate, shares, friction, points, units)
+    place, least = 0.0, np.inf
+    for step in range(PLACES):
+        cost = _cost_at(step / LINE_STEPS, shares, friction, points, units)
         if cost <= least:
-            place, least = candidate, cost
+            place, least = step / LINE_STEPS, cost
     _cost_at(place, shares, friction, points, units)
     moved = 0.0
     for k in range(TRACTION, TRACTION + WHEEL_COUNT):

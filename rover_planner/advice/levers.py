@@ -10,10 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.chance.samples import cut_around
 from rover_physics.limits.table import LIMITS, Limit, Sense
 from rover_physics.names import OPTIMAL, SERVO
+from rover_physics.rover.extent import find_reach
 from rover_physics.rover.manipulator import arm_angles, link_points
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.entrapment import MAX_LOOK_AHEAD
 from rover_planner.advice.case import MOST_FRICTION, Case, JudgedCase
 from rover_planner.advice.path_changes import (
     bend_path,
@@ -253,25 +257,29 @@ def _torque(refusal: JudgedCase) -> Span:
 
 def _rock(refusal: JudgedCase) -> Span | None:
     """Return by how much the ground below the highest wheel may be cut down [m]."""
-    heights = refusal.case.terrain.elevation[_disc(refusal.case, refusal)]
+    heights = refusal.case.terrain.elevation[_disc(refusal.case.terrain, refusal)]
     heights = heights[np.isfinite(heights)]
     height = float(heights.max() - np.median(heights)) if heights.size else 0.0
     return Span(0.0, (height,)) if height > 0.0 else None
 
 
-def _disc(case: Case, refusal: JudgedCase) -> Any:
+def _disc(terrain: Terrain, refusal: JudgedCase) -> Any:
     """Return the mask (ny, nx) of the cells around the place of the failure."""
-    terrain, (x, y) = case.terrain, refusal.place_on_ground
+    x, y = refusal.place_on_ground
     ny, nx = terrain.elevation.shape
     columns = terrain.origin[0] + terrain.resolution * np.arange(nx) - x
     rows = terrain.origin[1] + terrain.resolution * np.arange(ny) - y
-    return np.hypot(*np.meshgrid(columns, rows)) <= ROCK_RADIUS * case.rover.wheel.radius
+    away = np.hypot(columns, rows[:, None])
+    return away <= ROCK_RADIUS * refusal.case.rover.wheel.radius
 
 
 def _lower_rock(case: Case, refusal: JudgedCase, depth: float) -> Case:
-    disc, heights = _disc(case, refusal), case.terrain.elevation.copy()
+    """Return the case on the ground around its path, which may be a small part of a map."""
+    around = find_reach(case.rover) + MAX_LOOK_AHEAD * case.rover.wheelbase
+    part = cut_around(case.terrain, case.poses[:, :2], around)
+    disc, heights = _disc(part, refusal), part.elevation.copy()
     heights[disc] = np.minimum(heights[disc], np.nanmax(heights[disc]) - depth)
-    return case.change_site(terrain=replace(case.terrain, elevation=heights))
+    return case.change_site(terrain=replace(part, elevation=heights))
 
 
 def _describe_rock(refusal: JudgedCase, depth: float, _now: float) -> str:

@@ -41,8 +41,9 @@ class MapIntake(ABC):
         self.topic = CLOUD
         """Topic of the map in work."""
         self._logger, self._frames, self._refusals = logger, frames, RepeatLog()
-        self._unplaced: tuple[str, int | None] | None = None
-        self._last: tuple[bytes, type] | None = None
+        self._unplaced: tuple[Header, bytes, type] | None = None
+        self._last: tuple[bytes, type] | None = None  # that was taken, or refused before any was
+        self._is_taken = False
         self._waiting: dict[type, bytes] = {}
         self._pool = ThreadPoolExecutor(1, "maps")
         self.last_job: Future[None] = self.do(lambda: None)
@@ -73,31 +74,35 @@ class MapIntake(ABC):
 
     def offer(self, message: bytes, kind: type = PointCloud2) -> None:
         """Take a serialised message; one of its type that still waits is replaced."""
-        self._last = message, kind
         self._waiting[kind] = message
         self.do(partial(self._prepare_latest, kind))
 
     def repeat(self) -> None:
         """Prepare the last message again, if there is one, such as with other settings."""
-        last = self._last  # the thread may forget it meanwhile
-        if last is not None:
-            self.offer(*last)
+
+        def prepare_last() -> None:
+            if self._last is not None:
+                self._prepare(*self._last)
+
+        self.do(prepare_last)
 
     def retry(self) -> None:
-        """Prepare the last message again if its transform has come meanwhile; call it each second.
+        """Prepare a message again if its transform has come meanwhile; call it each second.
 
         A map that is published once may arrive before the first transform.
         """
-        if self._unplaced is not None:
+        unplaced = self._unplaced
+        if unplaced is not None:
             self._frames.listen()  # only then: /tf of a whole robot costs a loop its time
             with contextlib.suppress(TransformError):
-                self._frames.find(*self._unplaced)
+                self._find_source(unplaced[0])
                 self._unplaced = None
-                self.repeat()
+                self.do(partial(self._prepare, *unplaced[1:]))
 
     def forget(self) -> None:
         """Forget the last message, because another map replaces it; call it in the thread."""
-        self._last = None
+        self._last = self._unplaced = None
+        self._is_taken = False
 
     def do(self, job: Callable[[], Any]) -> Future[None]:
         """Call a function in the thread after all that was given before."""
@@ -116,23 +121,29 @@ class MapIntake(ABC):
 
     def _prepare_latest(self, kind: type) -> None:
         message = self._waiting.pop(kind, None)
-        if message is None:  # it was the latest in an earlier turn
-            return
+        if message is not None:  # else it was the latest in an earlier turn
+            self._prepare(message, kind)
+
+    def _prepare(self, message: bytes, kind: type) -> None:
         self.topic = CLOUD if kind is PointCloud2 else GRID_MAP
         self._unplaced = None
         try:
             read = read_message(message, kind)
-            self.prepare(read, self._find_source(read.header))
+            try:
+                source = self._find_source(read.header)
+            except TransformError:
+                self._unplaced = read.header, message, kind
+                raise
+            self.prepare(read, source)
+            self._last, self._is_taken = (message, kind), True
         except RoverError as error:
+            if not self._is_taken:
+                self._last = message, kind
             self.refuse(str(error))
 
     def _find_source(self, header: Header) -> Rigid | None:
         stamp = stamp_to_ns(header.stamp)
-        try:
-            return self._frames.find_source(header.frame_id, stamp, self.topic)
-        except TransformError:
-            self._unplaced = header.frame_id, stamp
-            raise
+        return self._frames.find_source(header.frame_id, stamp, self.topic)
 
 
 def are_gridded_alike(before: Any, now: Any) -> bool:

@@ -102,6 +102,14 @@ def test_a_little_less_of_a_remedy_is_refused(advised):
         assert not case.judge().passes, remedy.describe()
 
 
+def test_ground_is_lowered_on_the_part_of_a_large_map_around_the_path():
+    case = Case(Site(LSR1, make_terrain(rock_left, half=20.0)), STRAIGHT)
+    refusal, lever = case.judge(), next(one for one in LEVERS if one.name == "ground")
+    lowered = lever.apply(case, refusal, lever.settings(refusal).ends[0])
+    assert not refusal.passes and lowered.judge().passes
+    assert lowered.terrain.elevation.size < 0.2 * case.terrain.elevation.size
+
+
 def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):
     """The path was told to be traversable as it is."""
     place = MarkedPlace(0.3, 0.0, 0.2, "stuck", "today")

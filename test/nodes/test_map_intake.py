@@ -54,6 +54,28 @@ def test_each_map_is_prepared_and_the_last_again_where_a_parameter_changes():
     assert len(intake.made) == 3
 
 
+def test_a_refused_map_is_not_the_one_that_is_prepared_again():
+    intake = Intake()
+    intake.offer(cloud_of(1.0))
+    intake.wait_for(1)
+    intake.offer(b"damaged")
+    intake.repeat()
+    intake.wait_for(2)
+    intake.close()
+    assert intake.made[1].bounds == intake.made[0].bounds
+
+
+def test_a_map_that_comes_while_a_file_is_loaded_is_prepared_again_where_a_parameter_changes():
+    intake, go_on = Intake(), threading.Event()
+    intake.do(go_on.wait)
+    intake.do(intake.forget)
+    intake.offer(cloud_of(1.0))
+    go_on.set()
+    intake.repeat()
+    intake.wait_for(2)
+    intake.close()
+
+
 def test_of_maps_that_wait_only_the_latest_is_prepared():
     intake, go_on = Intake(), threading.Event()
     intake.do(go_on.wait)

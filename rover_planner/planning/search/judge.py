@@ -15,7 +15,7 @@ limit) - 1/2) x 2, which is 0 up to half of a limit and 1 at it.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import islice
 from statistics import NormalDist
 from typing import NamedTuple
@@ -246,9 +246,7 @@ class PathJudge:
             max(1.0 + low * math.hypot(std, off.model), LEAST_SHARE)
             for std in (off.friction, off.max_torque)
         )
-        layer = terrain.friction
-        ground = terrain if layer is None else replace(terrain, friction=friction * layer)
-        return ground, replace(
+        return _weaken(terrain, friction), replace(
             model,
             friction=friction * rover.friction,
             max_torque=torque * rover.wheel.max_torque,
@@ -339,6 +337,13 @@ class PathJudge:
         firsts = np.cumsum([0, *(len(pieces[row]) for row in passing[:-1])])
         refused = np.logical_or.reduceat(below, firsts)
         return [passing[row] for row in np.flatnonzero(refused).tolist()]
+
+
+@lru_cache(maxsize=1)
+def _weaken(terrain: Terrain, share: float) -> Terrain:
+    """Return a terrain with a share of its layer of friction: the same one for the next search."""
+    layer = terrain.friction
+    return terrain if layer is None else replace(terrain, friction=share * layer)
 
 
 def cost_of_path(rover: Rover, pieces: Sequence[Piece], path: Candidate) -> float:

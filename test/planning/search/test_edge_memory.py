@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of what is remembered from one search to the next."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rover_physics import Terrain
+from rover_physics.terrain.ground import pack_ground
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search import edge_memory
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.site import Site
 from support.grounds import make_terrain, raised, rocky, waves
 from support.predictions import assert_same
@@ -50,3 +54,13 @@ def test_where_forgetting_fails_the_next_search_knows_nothing_of_the_old_map(mon
             memory.begin(site)
     judge = PathJudge(site, *memory.begin(site))
     assert repr(judge.check(WAY).verdict) == repr(PathJudge(site).check(WAY).verdict)
+
+
+def test_a_map_with_friction_is_packed_for_the_first_search_alone():
+    ground = make_terrain(waves)
+    ground = replace(ground, friction=np.full(ground.elevation.shape, 0.8))
+    packed = []
+    for _ in range(2):
+        PathJudge(Site(LSR1, ground)).judge_pieces([Piece(WAY, Gear.FORWARD)])
+        packed.append(pack_ground.cache_info().misses)
+    assert packed[0] == packed[1]
