@@ -241,7 +241,7 @@ def count_rocks(cover: float, diameters: ArrayLike, largest: float) -> Floats:
     small, large = (
         np.exp(-q * d) / d - q * exp1(q * d) for d in (np.asarray(diameters), np.array(largest))
     )
-    return 4 * cover * q / np.pi * (small - large)
+    return np.maximum(4 * cover * q / np.pi * (small - large), 0.0)  # rounded where there are none
 
 
 def add_rocks(

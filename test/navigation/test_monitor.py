@@ -185,10 +185,13 @@ def test_a_difference_counts_once_it_has_lasted(service, monitor, monkeypatch):
 
     for k in range(16):
         assert look(0.1 * k, 0.1 if k == 5 else 0.4).state == WATCHING
-    found = look(1.6, 0.4)
+    assert look(1.7).state == WATCHING  # nothing was compared
+    assert look(4.0, 0.4).state == WATCHING  # nor for long before
+    assert look(4.9, 0.4).state == WATCHING
+    found = look(5.1, 0.4)
     assert (found.state, found.judgement.code) == (STOPPED, "suspension")
     assert "-0.400 rad at bogie_left" in found.judgement.reason
-    assert look(1.9).mismatch["bogie_left"] == -0.4
+    assert look(5.4).mismatch["bogie_left"] == -0.4
     assert look(9.0).mismatch == {}
 
 

@@ -96,6 +96,12 @@ def test_drawn_rocks_follow_the_size_frequency_law():
         assert abs(counted - expected) < 4 * np.sqrt(expected) + 1
 
 
+def test_rocks_that_are_too_rare_to_be_counted_are_none():
+    rng = np.random.default_rng(1)
+    for k in np.geomspace(2.0e-5, 2.1e-5, 100):
+        assert len(mars_terrain.draw_rocks(rng, k, 400.0, 0.1, 1.5)) == 0
+
+
 def test_a_rock_is_half_as_high_as_wide():
     elevation = np.full((81, 81), 1.0)
     mars_terrain.add_rocks(elevation, 0.01, np.array([40.0]), np.array([40.0]), np.array([0.4]))

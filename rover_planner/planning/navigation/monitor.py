@@ -169,6 +169,8 @@ class PathMonitor:
         """Compare measured and predicted suspension where the rover stands."""
         report = sight.snapshot.compare_standing()
         if report is not None:
+            if sight.time - self._compared_time > DRIFT_TIME:  # what was meanwhile is not known
+                self._agreed_time = sight.time
             self.finding = replace(self.finding, mismatch=dict(report.suspension_mismatch))
             self._compared_time = sight.time
         elif sight.time - self._compared_time > DRIFT_TIME:
@@ -179,7 +181,7 @@ class PathMonitor:
     def _refuse_drift(self, sight: Sight) -> PathJudgement | None:
         """Return a refusal if the suspension has differed too much for some time."""
         most, latest = sight.snapshot.settings.parameters.monitor_mismatch, self.finding.mismatch
-        if most == 0.0 or sight.time - self._agreed_time <= DRIFT_TIME:
+        if most == 0.0 or self._compared_time - self._agreed_time <= DRIFT_TIME:
             return None
         joint = max(latest, key=lambda name: abs(latest[name]))
         reason = (
