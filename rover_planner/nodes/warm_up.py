@@ -58,10 +58,9 @@ def search_lattice() -> None:
     rover, ground = load_rover("lsr1"), Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
     nodes = nodes_within(0.2, (1.0, 1.0), (2.0, 2.0))
     edges = Edges(nodes, make_primitives(rover, nodes.cell, 0.1))
-    doubt = np.zeros(nodes.count, np.float32)
     difficulty = estimate_difficulty(rover, ground, nodes, 0.5, edges.primitives)
     start, goal = (Seeds(np.array([node]), np.zeros(1)) for node in (0, nodes.count - 1))
-    search = ShortestPaths(edges, doubt, difficulty, start)
+    search = ShortestPaths(edges, difficulty, start)
     for caution in (1.0, 0.0):
         search.find(start, goal, caution)
 

@@ -2,8 +2,7 @@
 """Shortest paths over the edges of a lattice, compiled.
 
 An edge that is judged costs what the model found, or cannot be driven. One that is not judged
-costs what it would on level ground, times 1 + `caution` x the doubt at its end, and `caution` x
-PRICE x its difficulty more.
+costs what it would on level ground, and `caution` x PRICE x its difficulty more.
 
 A search goes on from the tree of the last one (compare Koenig, Likhachev and Furcy 2004, Lifelong
 Planning A*): what hangs on edges that are dearer now is cut off and reached anew from around it.
@@ -48,12 +47,10 @@ class Graph(NamedTuple):
     """(nodes, P) costs [m] of the edges that pass."""
     standing: np.ndarray
     """(nodes,) states of the nodes, see `Edges`."""
-    doubt: np.ndarray
-    """(nodes,) doubt that edges to a node pass, 0 for none."""
     difficulty: Difficulty
     """Estimates how likely edges are refused."""
     caution: float
-    """Weight of doubt and difficulty; with 0 no edge is estimated above its true cost."""
+    """Weight of difficulty; with 0 no edge is estimated above its true cost."""
     rows: int
     """Number of rows of places."""
     columns: int
@@ -114,7 +111,7 @@ def edge_cost(graph, node, k, end):
         return least
     price = PRICE * graph.difficulty.cell
     difficulty = difficulty_of(graph.difficulty, graph.columns, node, k)
-    return least + graph.caution * (least * graph.doubt[end] + price * difficulty)
+    return least + graph.caution * price * difficulty
 
 
 @exact_kernel
@@ -384,15 +381,9 @@ class Route:
 class ShortestPaths:
     """Searches one lattice between fixed ends again and again, while edges are judged."""
 
-    def __init__(
-        self,
-        edges: Edges,
-        doubt: NDArray[np.float32],
-        difficulty: Difficulty,
-        starts: Seeds,
-    ):
+    def __init__(self, edges: Edges, difficulty: Difficulty, starts: Seeds):
         """Search from about the nodes of the first seeds; later ones must be among them."""
-        self._edges, self._doubt, self._difficulty = edges, doubt, difficulty
+        self._edges, self._difficulty = edges, difficulty
         nodes, count = edges.nodes, edges.nodes.count
         self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), np.inf)
         self._tree, self._changed = empty_tree(count), [starts.nodes]
@@ -416,7 +407,7 @@ class ShortestPaths:
         Args:
             starts: Nodes of the start's connections and their costs [m].
             goals: Nodes of the goal's connections and their costs [m].
-            caution: Weight of the doubts.
+            caution: Weight of the difficulties.
         """
         graph = self.graph(caution)
         if self._caution is None and caution > 0.0:
@@ -436,7 +427,7 @@ class ShortestPaths:
     def graph(self, caution: float) -> Graph:
         """Return the lattice as kernels read it."""
         edges = self._edges
-        known = edges.state, edges.cost, edges.standing, self._doubt, self._difficulty
+        known = edges.state, edges.cost, edges.standing, self._difficulty
         return Graph(edges.least_cost, edges.links, *known, caution, *edges.nodes.shape)
 
     def _guess(self, caution: float, goals: Seeds) -> None:

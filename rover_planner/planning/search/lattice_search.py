@@ -4,7 +4,7 @@
 The search is lazy (LazySP; Dellin and Srinivasa 2016, A unifying formalism for shortest path
 problems with expensive edge evaluations): find the shortest path by what is known, ask the model
 about its nodes, then about its edges, and again. A node where the rover cannot stand belongs to no
-path. First the search is cautious: edges near refused ones are dearer, so that a first path is
+path. First the search is cautious: edges on difficult ground are dearer, so that a first path is
 found soon. Then it is exact: edges that are not judged cost what they would on level ground, so
 that the cost of the shortest path is a bound from below on that of any path on the lattice.
 """
@@ -27,10 +27,7 @@ from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.primitives import Piece
 
 CAUTIONS = (12.0, 1.0, 0.0)
-"""Weights of the doubts, one after the other; with 0 the search is exact."""
-DOUBT = 0.3
-"""Doubt that a refused edge adds to the nodes around its end: the cost of edges that lead there
-rises by this share."""
+"""Weights of the difficulties, one after the other; with 0 the search is exact."""
 FEW_NODES, NODES_ASKED = 200, 0.05
 """Number of nodes around refused ones that are asked about at least, and in addition for each node
 that the last search expanded: then both take about as long."""
@@ -134,9 +131,7 @@ class LatticeSearch:
     def __post_init__(self) -> None:
         self.ends = _Ends(self.starts), _Ends(self.goals)
         """Judged connections of the start and of the goal."""
-        self.doubt = np.zeros(self.edges.nodes.count, np.float32)
-        """(nodes,) doubt that the rover can be at a node; grows with the search."""
-        self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
+        self.shortest = ShortestPaths(self.edges, self.difficulty, self.ends[0].seeds)
         self._refused: list[tuple[int, float]] = []
 
     def run(self, allowed: Callable[["LatticeSearch"], bool]) -> SearchProgress:
@@ -254,14 +249,12 @@ class LatticeSearch:
             kept.write(index, judged.code, judged.cost)
             if kept is self.edges:
                 self.progress.judged += 1
-                self._note(index, DOUBT if judged.code else 0.0)
+                self._note(index)
         return not any(judged.code for judged in found)
 
-    def _note(self, edge: int, doubt: float) -> None:
-        """Note that the cost of an edge has changed; add to the doubt of those that lead there."""
-        around = self.edges.nodes.around(self.edges.ends(np.array([edge])))
-        self.doubt[around] += doubt
-        self.shortest.note(around)
+    def _note(self, edge: int) -> None:
+        """Note that the cost of an edge has changed."""
+        self.shortest.note(self.edges.ends(np.array([edge])))
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""
@@ -282,7 +275,7 @@ class LatticeSearch:
         if isinstance(kept, Edges):
             self._refused.append((index, float(kept.cost.flat[index])))
             kept.write(index, code, np.inf)
-            self._note(index, 0.0)
+            self._note(index)
         else:
             kept.write(index, code, np.inf)
 

@@ -18,7 +18,7 @@ EDGES = Edges(NODES, PRIMITIVES)
 
 
 def random_knowledge(seed):
-    """Return edges of which half is judged, some refused, doubts of nodes, and hard ground."""
+    """Return edges of which half is judged, some refused, and hard ground."""
     rng = np.random.default_rng(seed)
     known = Edges(NODES, PRIMITIVES)
     judged = rng.random(known.state.shape) < 0.5
@@ -30,7 +30,7 @@ def random_knowledge(seed):
     level = np.zeros((2, 5, 6), np.float32), np.zeros((16, 6, 2), np.int64), 1.0
     places = sample_primitives(PRIMITIVES, SAMPLE_SHARE * NODES.cell)
     hardness = Difficulty(*level, steps, np.zeros(2), 0.5, NODES.cell, places)
-    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness
+    return known, hardness
 
 
 def explicit_costs(known, graph):
@@ -54,12 +54,12 @@ def explicit_costs(known, graph):
 def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
     found = 0
     for seed, caution in enumerate((1.0, 0.0)):
-        known, *estimates = random_knowledge(seed)
+        known, hardness = random_knowledge(seed)
         rng = np.random.default_rng(seed + 100)
         free = np.flatnonzero(known.standing == 0)
         starts = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
         goals = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
-        search = ShortestPaths(known, *estimates, starts)
+        search = ShortestPaths(known, hardness, starts)
         route = search.find(starts, goals, caution)
         costs = dijkstra(explicit_costs(known, search.graph(caution)), indices=starts.nodes)
         totals = starts.costs[:, None] + costs[:, goals.nodes] + goals.costs
