@@ -105,7 +105,7 @@ def keep_inputs(inputs: Iterable[str | Path | None], *outputs: Path | None) -> N
     known = {os.path.realpath(file) for file in inputs if file is not None}
     for file in filter(None, outputs):
         path = os.path.realpath(file)
-        if path in known:
+        if path in known and path != os.devnull:
             raise PlanningError(
                 f"{show_file(file)} is named twice and would be overwritten; write to another file"
             )

@@ -2,6 +2,7 @@
 """The command line: help, poses, some commands; bad input is exit code 2 and one short line."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -195,6 +196,10 @@ REFUSED = [
 )
 def test_bad_input_is_refused_in_one_short_line(files, capfd, words, names):
     assert_refused(capfd, main(words), names)
+
+
+def test_what_nobody_wants_may_all_go_to_the_null_device():
+    assert main(["urdf", "lsr1", os.devnull, "--map", os.devnull]) == 0
 
 
 @pytest.mark.parametrize(
