@@ -130,7 +130,7 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     answer = planner.ask(plant.pose(), goal)
     assert answer.traversable, answer.reason
     settings = DriveSettings(position_tolerance=0.1, timeout=200.0)
-    Drive(planner, planner.rover, goal, settings, lambda told: None).run(answer.poses)
+    Drive(planner, goal, settings, lambda told: None).run(answer.poses)
     assert np.hypot(*(plant.pose() - goal)[:2]) < 0.1
     assert controller.statistics.updates > 20 and controller.statistics.fallbacks == 0
     last = server.service.terrain
