@@ -26,7 +26,7 @@ CHANGE = 1.5
 sensor may turn at some wheels and stay at others."""
 SPIKE = 1.3
 """Torque over the largest one of a motor from which it is an error."""
-SIGN_TIME = 2.0
+SIGN_TIME = 4.0
 """Time constant of the search for wrong signs [s]."""
 SIGN_SHARE = 0.25
 """Share of a contradiction that is left when one sign is turned, if this sign is wrong."""

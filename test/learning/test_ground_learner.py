@@ -243,6 +243,12 @@ def test_a_bad_sensor_is_told_and_not_believed(sensors, spoil, word):
     assert abs(estimate.resistance) < 0.1
 
 
+def test_a_torque_that_contradicts_the_others_while_a_drive_begins_has_no_wrong_sign():
+    rows = climb(ROVER, SLOPE, 1.6)[::5]
+    rows[:, TORQUES.start + 4] *= -1.0
+    assert not learn(rows).estimate.faults
+
+
 def test_coarse_rates_whose_last_digit_turns_at_three_wheels_only_are_not_frozen():
     rows, digit = climb(ROVER, SLOPE, 8.0)[::2], 0.05
     rates = 0.4 + 0.004 * np.random.default_rng(4).standard_normal((len(rows), 6))

@@ -72,6 +72,7 @@ def test_a_loaded_map_survives_100_local_updates_to_the_bit():
     assert merged.elevation_std is None
 
 
+@pytest.mark.parametrize("begin", [LivingMap.merge, LivingMap.replace])
 @pytest.mark.parametrize(
     "maps",
     [
@@ -80,10 +81,11 @@ def test_a_loaded_map_survives_100_local_updates_to_the_bit():
         [(0.1, TOPIC, 1e9, 0), (0.2, TOPIC, 3.0, 1)],  # its clock went back
     ],
 )
-def test_the_newer_height_wins_whichever_arrives_last(maps):
-    living = LivingMap()
+def test_the_newer_height_wins_whichever_arrives_last(maps, begin):
+    living, take = LivingMap(), begin
     for height, source, time, winner in maps:
-        living.merge(local_map((0.0, 0.0), height), source, time)
+        take(living, local_map((0.0, 0.0), height), source, time)
+        take = LivingMap.merge
         assert cell(living, 0.5, 0.5) == maps[winner][:3]
 
 
@@ -94,24 +96,6 @@ def test_the_surer_height_wins_until_it_has_aged():
         living.merge(local_map((0.0, 0.0), height, std=std), TOPIC, time)
         assert cell(living, 0.5, 0.5)[0] == winner
     np.testing.assert_array_equal(living.snapshot().terrain.elevation_std, 0.002)
-
-
-def test_a_map_that_merges_into_one_that_was_replaced_wins_though_its_clock_went_back():
-    living = LivingMap()
-    living.replace(local_map((0.0, 0.0), 0.1), TOPIC, 1e9)
-    living.merge(local_map((0.0, 0.0), 0.2), TOPIC, 3.0)
-    assert cell(living, 0.5, 0.5) == (0.2, TOPIC, 3.0)
-
-
-def test_without_a_window_any_more_the_whole_loaded_map_is_there_again():
-    living = loaded(map_window=2.0)
-    living.merge(local_map((0.0, 0.0), 1.0), TOPIC, 1.0)
-    living.values = TraverseServerParameters()
-    living.merge(local_map((0.0, 0.0), 1.0), TOPIC, 2.0)
-    own = loaded()
-    own.merge(local_map((0.0, 0.0), 1.0), TOPIC, 2.0)
-    x, y = PRIOR.origin
-    assert cell(living, x, y) == cell(own, x, y)
 
 
 @pytest.mark.parametrize(
@@ -160,6 +144,9 @@ def test_a_window_rolls_with_the_rover_and_takes_the_loaded_map_anew():
     height, source, _ = cell(living, -2.5, 0.3)
     assert source == "loaded"
     assert height == pytest.approx(float(PRIOR.elevation_at(-2.5, 0.3)), abs=1e-6)
+    living.values = TraverseServerParameters()  # without a window, all of it is there again
+    living.merge(local_map((-2.1, -0.1), 2.0, (4, 4)), TOPIC, 100.0)
+    assert cell(living, *PRIOR.origin) == (PRIOR.elevation[0, 0], "loaded", 0.0)
 
 
 def test_a_loaded_map_stays_whole_until_the_first_local_map():

@@ -16,7 +16,6 @@ from rover_planner.shell.run_program import END_SIGNALS
 from rover_planner.survey.dask_cluster import ClusterSettings, open_client
 from rover_planner.survey.runner import run_survey
 from rover_planner.survey.store import SurveyStore
-from rover_planner.survey.survey import prepare_survey
 from support.project.checkout import TOP
 from support.survey_maps import (
     assert_same_bits,
@@ -118,8 +117,6 @@ def test_a_chunk_of_which_workers_die_is_named_and_the_rest_stands(tmp_path):
     settings = ClusterSettings(workers=1)
     outcome = run_survey(prepared.job, prepared.chunks, settings, task=die_on_one)
     assert outcome.failed == {(0, 1): "its worker died 3 times"} and outcome.done == 3
-    again = prepare_survey(make_request(), str(tmp_path / "map.npz"), tmp_path / "out")
-    assert again.chunks == [(0, 1)]
 
 
 def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(whole, tmp_path):

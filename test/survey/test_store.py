@@ -58,25 +58,16 @@ def test_finished_chunks_are_not_done_again_and_half_written_or_lost_ones_are(fi
     assert prepared.chunks == []
     for lost in ("worst_tilt/c/0/0", "worst_tilt/c/2/1", "seconds/c/0/1", "seconds/c/1/1"):
         (prepared.store.path / lost).unlink()  # in the first one nothing is known
+    (prepared.store.path / "best_class/c/1/1").unlink()
+    told = summarise(prepared.store)
+    for name in ("best_class", "worst_class"):  # shares of the cells that are there
+        assert sum(told[name].values()) == pytest.approx(1.0, abs=1e-5)
     rows, columns = prepared.store.notes.layout.cells_of((1, 1))
     prepared.store._group["worst_tilt"][rows, columns] = 7.0  # it was stopped after this layer
     again = prepare(finished, request)
     assert again.chunks == [(0, 0), (0, 1), (1, 1), (2, 1)] and again.finished == 5
     assert_same_bits(layers_of(compute_here(again).store), before)
     assert prepare(finished, request).chunks == []
-
-
-def test_shares_of_the_summary_add_up_to_1_where_a_file_is_lost(finished):
-    store = prepare(finished, make_request(step=4, headings=2)).store
-    (store.path / "best_class/c/1/1").unlink()
-    told = summarise(store)
-    for name in ("best_class", "worst_class"):
-        assert sum(told[name].values()) == pytest.approx(1.0, abs=1e-5)
-
-
-def test_a_store_has_a_bit_for_each_of_the_most_headings(files):
-    store = prepare(files, make_request(headings=64)).store
-    assert store.layer("passable_headings").dtype == np.uint64
 
 
 @pytest.mark.parametrize(

@@ -232,6 +232,7 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
     [
         (["--headings", "65"], "headings is 65; it must be 1 to 64"),
         (["--step", "0"], "step is 0; it must be 1 to 10000"),
+        (["--policy", "servo"], "policy 'servo' has no bounds"),
         (["--workers", "100000"], "100000 workers need "),
         (["--memory-limit", "lots"], "memory limit is 'lots'; it must be a size such as 1GiB"),
         (["--memory-limit", "100MB"], "a worker has 100 MB: give a smaller --chunk"),
@@ -243,13 +244,8 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
     ],
 )
 def test_bad_input_is_one_line_before_a_store_is_made(ground, monkeypatch, words, said, capfd):
-    monkeypatch.setattr(dask_cluster, "CONNECT_TIME", 0.5)
-    assert_refused(capfd, survey(ground, *words), said)
-    assert not ground.with_name("out").exists()
-
-
-def test_a_policy_without_bounds_is_refused_on_an_uncertain_map(ground, capfd):
     known = load_terrain(ground)
     save_terrain(ground, replace(known, elevation_std=0.01 * np.abs(known.elevation)))
-    assert_refused(capfd, survey(ground, "--policy", "servo"), "policy 'servo' has no bounds")
+    monkeypatch.setattr(dask_cluster, "CONNECT_TIME", 0.5)
+    assert_refused(capfd, survey(ground, *words), said)
     assert not ground.with_name("out").exists()

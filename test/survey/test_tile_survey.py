@@ -164,14 +164,16 @@ def test_no_cell_passes_whose_outline_touches_unknown_ground():
     assert stands.traversable  # the wheels stand beside the hole, where a survey does not pass
 
 
-def test_ground_that_is_all_unknown_is_impassable():
-    layers = survey_tile(make_request(turns=True, chance=True), None, np.zeros((5, 2)))
+@pytest.mark.parametrize("headings", [4, 64])
+def test_ground_that_is_all_unknown_is_impassable_in_layers_of_the_listed_types(headings):
+    request = make_request(headings=headings, turns=True, chance=True)
+    layers = survey_tile(request, None, np.zeros((5, 2)))
     assert (layers["best_class"] == IMPASSABLE).all()
     assert (layers["first_limit"] == number_limits()["unknown_ground"]).all()
     assert not layers["passable_headings"].any() and np.isnan(layers["worst_tilt"]).all()
     assert (layers["worst_failure_chance"] == 1.0).all()
     assert (layers["best_failure_chance"] == 1.0).all()
-    listed = list_layers(4, True, True)
+    listed = list_layers(headings, True, True)
     assert {k: v.dtype for k, v in layers.items()} == {k: v.dtype for k, v in listed.items()}
 
 
