@@ -14,14 +14,10 @@ from support.grounds import with_std
 from support.paths import poses_at
 
 
-def by_name(table):
-    """Return the shapes of arrays by their names; the table has names by shape."""
-    return {name: shape for shape, names in table.items() for name in names.split()}
-
-
 ASSUMED = '{"rover": "lsr1", "policy": "equal"'
-SHAPES = by_name(
-    {
+SHAPES = {
+    name: shape
+    for shape, names in {
         (): "traversable first_failure assumptions",
         (N,): "settled roll pitch tip_over_ratio tip_over_force_angle belly_clearance energy time "
         "reason status power distance speed_share stalls",
@@ -31,8 +27,10 @@ SHAPES = by_name(
         "steering_angle wheel_speed contact_angle torque friction sinkage motion_resistance "
         "wheel_drop falling slip_speed lift_rate lift_height",
         (N, 6, 3): "wheel_centres contact_points",
-    }
-)
+    }.items()
+    for name in names.split()
+}
+"""Shapes of arrays by their names."""
 TYPES = {
     "traversable": "b", "first_failure": "i", "assumptions": "U", "settled": "b", "reason": "U",
     "status": "i", "falling": "b",

@@ -45,11 +45,6 @@ def start_simulator(ros, terrain_file):
     return start
 
 
-def start_controller(ros) -> TractionController:
-    """Return a controller with the longest timeouts, for the sake of busy machines."""
-    return ros.start(TractionController, enabled_at_start=True, **PATIENT)
-
-
 class Ear(Node):
     """Keeps what it hears, and commands a motion."""
 
@@ -123,7 +118,8 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     ros, start_simulator, start_server, planner, engine
 ):
     simulator = start_simulator(follow_commands=True, engine=engine, sensor_range=2.0)
-    server, controller = start_server(planner="fan", map_updates="merge"), start_controller(ros)
+    server = start_server(planner="fan", map_updates="merge")
+    controller = ros.start(TractionController, enabled_at_start=True, **PATIENT)
     planner.wait_for_server()
     first = wait_until(lambda: server.service.terrain, "the map")
     plant, goal = simulator.simulation.plant, [START_X + 0.25, 0.01, 0.0]
@@ -141,7 +137,7 @@ def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(
     ros, ear, start_simulator
 ):
     simulation = start_simulator(follow_commands=True).simulation
-    controller = start_controller(ros)
+    controller = ros.start(TractionController, enabled_at_start=True, **PATIENT)
     wait_until(lambda: controller.statistics.updates > 5, "the controller to run")
     place = simulation.plant.pose()
 

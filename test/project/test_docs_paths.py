@@ -65,28 +65,19 @@ def is_in_code(dotted: str) -> bool:
     return True
 
 
-def missing_files(page: Path) -> set[str]:
-    outside_blocks = re.sub(r"^```.*?^```", "", current_text(page), flags=re.M | re.S)
-    named = {word for word in re.findall(r"`([^`\n]+)`", outside_blocks) if names_a_place(word)}
-    named -= {*MADE, *(word for word in named if word.startswith(WRITTEN))}
-    links = {link for link in re.findall(r"\]\(([^)#]+)\)", read(page)) if "://" not in link}
-    return {word for word in named if not exists(word, page)} | {
-        link for link in links if not (TOP / page).parent.joinpath(link).exists()
-    }
-
-
-def missing_names(page: Path) -> set[str]:
-    words = {
-        word.split("(")[0].rstrip(".") for word in re.findall(r"[\w.]+\(?", current_text(page))
-    }
-    dotted = {word for word in words if word.split(".")[0] in PACKAGES and "." in word}
-    return {word for word in dotted if not word.endswith((".py", ".md")) and not is_in_code(word)}
-
-
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_files_links_names_and_targets_of_a_page_exist(page):
-    assert not missing_files(page)
-    assert not missing_names(page)
+    text = current_text(page)
+    outside_blocks = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+    named = {word for word in re.findall(r"`([^`\n]+)`", outside_blocks) if names_a_place(word)}
+    named -= {*MADE, *(word for word in named if word.startswith(WRITTEN))}
+    assert not {word for word in named if not exists(word, page)}
+    links = {link for link in re.findall(r"\]\(([^)#]+)\)", read(page)) if "://" not in link}
+    assert not {link for link in links if not (TOP / page).parent.joinpath(link).exists()}
+    words = {word.split("(")[0].rstrip(".") for word in re.findall(r"[\w.]+\(?", text)}
+    dotted = {word for word in words if word.split(".")[0] in PACKAGES and "." in word}
+    names = {word for word in dotted if not word.endswith((".py", ".md"))}
+    assert not {name for name in names if not is_in_code(name)}
     targets = re.findall(r"^(\w+):", (TOP / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     assert set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE)) <= set(targets)
 
@@ -105,16 +96,12 @@ def test_the_page_of_the_command_line_has_every_command():
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_option_that_a_page_gives_to_a_command_exists(page):
-    for command, rest in re.findall(r"rover_planner (\w+)([^`\n#]*)", current_text(page)):
+def test_every_option_parameter_argument_topic_and_service_that_a_page_gives_exists(page):
+    text = current_text(page)
+    for command, rest in re.findall(r"rover_planner (\w+)([^`\n#]*)", text):
         if command in OPTIONS:
             asked = set(re.findall(r"(?<!\w)--[a-z][\w-]*", rest))
             assert asked <= OPTIONS[command], f"rover_planner {command}"
-
-
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_parameter_argument_topic_and_service_that_a_page_gives_to_ros_exists(page):
-    text = current_text(page)
     parameters = {spec.name for one in PROGRAMS.values() for spec in one.parameters}
     assert set(re.findall(r"-p ([a-z]\w*):=", text)) <= parameters
     assert set(re.findall(r"ros2 param set /\w+ (\w+)", text)) <= parameters

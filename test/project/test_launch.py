@@ -94,24 +94,19 @@ def test_the_simulation_is_the_rover_with_a_simulator():
 
 
 @pytest.mark.parametrize("path", [*PARAMETER_FILES, FOR_NAV2], ids=lambda path: path.stem)
-def test_a_parameter_file_has_parameters_that_exist_for_any_namespace(path):
+def test_a_parameter_file_has_known_parameters_for_any_namespace_and_defaults_of_its_node(path):
     ((pattern, content),) = yaml.safe_load(path.read_text()).items()
     node = "traverse_server" if path == FOR_NAV2 else path.stem.removeprefix("simulated_")
     assert pattern == (node if path == FOR_NAV2 else "/**")
     assert list(content) == ["ros__parameters"]
     check_parameters(node, content["ros__parameters"])
+    if path.stem in ("traverse_server", "traction_controller"):  # not for a simulation
+        defaults = {spec.name: spec.ros_default for spec in PROGRAMS[node].parameters}
+        assert content["ros__parameters"].items() <= defaults.items()
 
 
-@pytest.mark.parametrize("name", ["traverse_server", "traction_controller"])
-def test_a_parameter_file_has_the_defaults_where_it_is_not_for_a_simulation(name):
-    text = (CONFIG / "parameters" / f"{name}.yaml").read_text()
-    defaults = {spec.name: spec.ros_default for spec in PROGRAMS[name].parameters}
-    for key, value in yaml.safe_load(text)["/**"]["ros__parameters"].items():
-        assert defaults[key] == value, key
-
-
-def topics_of(path: Path) -> set[str]:
-    """Return the topics that a layout names, without the leading slash."""
+@pytest.mark.parametrize("path", LAYOUTS, ids=lambda path: path.name)
+def test_a_layout_shows_topics_that_the_nodes_publish(path):
     text = path.read_text()
     if path.suffix == ".rviz":
         displays = yaml.safe_load(text)["Visualization Manager"]["Displays"]
@@ -120,18 +115,13 @@ def topics_of(path: Path) -> set[str]:
     else:
         json.loads(text)
         found = set(re.findall(r'"(/[a-z_]+(?:/[a-z_]+)*)[."]', text))
-    return {name.lstrip("/") for name in found}
-
-
-@pytest.mark.parametrize("path", LAYOUTS, ids=lambda path: path.name)
-def test_a_layout_shows_topics_that_the_nodes_publish(path):
+    shown = {name.lstrip("/") for name in found}
     published = set()
     for node, program in PROGRAMS.items():
         for part in program.topics.split("; "):
             if part.startswith("publishes"):
                 published |= {re.sub("^~", node, name)
                               for name in re.findall(r"[~/a-z_]+", part)}  # fmt: skip
-    shown = topics_of(path)
     assert {"elevation_cloud", "traverse_server/plan", "traverse_server/markers"} <= shown
     assert shown <= published | OF_OTHERS
 

@@ -103,18 +103,6 @@ def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
     assert (np.diff(np.array(worst, float), axis=0) >= 0.0).all()
 
 
-def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit():
-    session = session_on(waves)
-    session.change_rover([("wheel", "max_torque")], 0.01)
-    path = session.shown.path
-    assert path.verdict.first_failure == 0
-    told = paths.describe_limits(path, None)
-    assert path.failure.state.distance == told["end"] == 0.0
-    assert {len(one["now"]["x"]) for one in told["lanes"]} == {len(told["loads"]["x"])} == {1}
-    codes, uses = [lane.code for lane in path.limits.lanes], paths.describe_uses(path, 0.0)
-    assert uses[codes.index("torque")]["broken"] and uses[codes.index("tilt")]["now"].endswith("%")
-
-
 def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     session = session_on(ramp, options=CANDIDATES)
     session.change_rover([("friction",)], 0.55)
