@@ -13,9 +13,8 @@ from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_r
 from rover_physics.chance import failure_chance
 from rover_physics.chance.failure_chance import EVEN_SHARE, PLACES, SAMPLES, FailureChance
 from rover_physics.chance.samples import DEVIATES, draw_samples
-from rover_physics.errors import ModelError, RoverFileError
+from rover_physics.errors import ModelError
 from rover_physics.limits.table import CHANCE
-from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.uncertainty import Uncertainty
 from rover_physics.traversability.verdict import refuse_chance
 from support.grounds import make_terrain, plane, rocky, with_std
@@ -225,14 +224,6 @@ def test_the_docs_tell_what_is_uncertain_and_its_default():
     rows = re.findall(r"^- `(\w+)` \(([\d.]+)\)", DOCS.read_text(), re.MULTILINE)
     assert {name: float(value) for name, value in rows} == vars(Uncertainty())
     assert set(DEVIATES) == set(vars(Uncertainty()))
-
-
-def test_a_rover_file_tells_what_is_uncertain():
-    contents = rover_to_dict(load_rover("lsr1"))
-    told = rover_from_dict(contents | {"uncertainty": {"friction": 0.2}}, "here")
-    assert told.uncertainty == replace(Uncertainty(), friction=0.2)
-    with pytest.raises(RoverFileError, match=r"uncertainty.friction"):
-        rover_from_dict(contents | {"uncertainty": {"friction": -0.1}}, "here")
 
 
 @pytest.mark.long
