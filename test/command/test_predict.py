@@ -101,8 +101,9 @@ def test_waypoints_that_are_far_apart_are_warned_of(files, capfd):
     assert "from waypoint 1 to 2 it is 0.1012 m" in capfd.readouterr().err
 
 
-def test_classes_torque_ranges_and_chances_are_added_on_demand(files):
-    words = "--classes", "--torque-ranges", "--chance"
+@pytest.mark.parametrize("chance", [["--chance"], ["--accepted-chance", "0.01"]])
+def test_classes_torque_ranges_and_chances_are_added_on_demand(files, chance):
+    words = "--classes", "--torque-ranges", *chance
     assert main([*predict_arguments(files), *words]) == 0
     with np.load(files / "out.npz", allow_pickle=False) as out:
         names = ("traversability_class", "class_constraint", "class_wheel", "class_margin")
@@ -167,11 +168,6 @@ def test_a_disk_that_is_full_is_one_line_and_leaves_no_temporary_file(files, mon
     (files / "out.npz").symlink_to("/dev/full")
     assert_refused(capfd, main(predict_arguments(files)), "No space left on device")
     assert [path.name for path in files.iterdir() if path.name.startswith(".")] == []
-
-
-def test_an_accepted_chance_asks_for_the_chance(files):
-    assert main([*predict_arguments(files), "--accepted-chance", "0.01"]) == 0
-    assert "failure_chance" in np.load(files / "out.npz")
 
 
 def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monkeypatch):

@@ -64,16 +64,25 @@ def test_hold_starts_from_the_torques_that_balance_the_weight_on_a_slope():
 
 
 @pytest.mark.parametrize(
-    ("policy", "lost", "brake"),
-    [("hold", "joint_states", True), ("brake", "imu", True), ("coast", "imu", False)],
+    ("policy", "lost", "timeout", "brake"),
+    [
+        ("hold", "joint_states", 0.08, True),
+        ("brake", "imu", 0.08, True),
+        ("coast", "cmd_vel", 0.52, False),
+    ],
 )
-def test_brake_coast_and_hold_without_wheel_rates_give_no_torque(policy, lost, brake):
+def test_after_the_timeout_of_a_lost_input_brake_coast_and_hold_without_rates_give_no_torque(
+    policy, lost, timeout, brake
+):
     rig = CreepingRover(rest_policy=policy)
-    assert not rig.run(1.0).brake
-    command = rig.run(0.1, *(name for name in INPUTS if name != lost))
+    command = rig.run(1.0)
+    assert not command.brake and command.torques.any()
+    command = rig.run(timeout, *(name for name in INPUTS if name != lost))
     assert command.state == "fault" and command.fault.startswith(f"{lost} stale")
     assert command.brake == brake and not command.torques.any()
     assert rig.run(0.1).brake == (policy == "brake")  # hold takes over again
+    command = rig.run(RECOVERY_TIME)
+    assert command.state == "driving" and command.torques.any()
 
 
 def test_driving_goes_on_from_the_torques_of_rest():

@@ -37,17 +37,6 @@ class Rig(CreepingRover):
         return rates
 
 
-@pytest.mark.parametrize("silent", ["joint_states", "imu", "cmd_vel"])
-def test_a_silent_input_stops_the_wheels_after_its_timeout_and_its_return_starts_them(silent):
-    rig = Rig()
-    assert rig.run(0.6).torques.any()
-    others = [name for name in ("joint_states", "imu", "cmd_vel") if name != silent]
-    update = rig.run(0.52 if silent == "cmd_vel" else 0.08, *others)
-    assert not update.torques.any() and update.fault.startswith(f"{silent} stale")
-    update = rig.run(AGAIN)
-    assert update.fault == "" and update.torques.any()
-
-
 @pytest.mark.parametrize(
     ("values", "kind", "name"),
     [

@@ -13,7 +13,7 @@ from rover_planner.advice.levers import LEVERS
 from rover_planner.ros.qos import LATCHED_QOS
 from support.grounds import make_terrain, rock_left
 from support.planner_client import SERVER, begin_plan
-from support.ros_fixtures import call
+from support.ros_fixtures import call, hear
 from support.waiting import wait_until
 
 START, GOAL = (-1.0, 0.0, 0.0), (1.2, 0.0, 0.0)
@@ -30,10 +30,7 @@ def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ro
     monkeypatch.setattr(seek, "LEVERS", few)
     start_server(planner="fan", candidate_count=1, advice_time=60.0)
     advise = client.create_client(Trigger, f"{SERVER}/advise")
-    grown: list[dict] = []
-    client.create_subscription(
-        String, f"{SERVER}/advice", lambda one: grown.append(json.loads(one.data)), LATCHED_QOS
-    )
+    grown = hear(client, String, f"{SERVER}/advice", LATCHED_QOS)
     assert json.loads(call(advise, Trigger.Request()).message)["code"] == "no_path"
     client.send_terrain(make_terrain(rock_left))
     assert not client.can_traverse(START, GOAL).poses
@@ -41,8 +38,9 @@ def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ro
     advice = json.loads(response.message)
     assert response.success and advice["complete"] and advice["code"] == "belly"
     assert any("poses" in one for one in advice["remedies"])
-    wait_until(lambda: grown and grown[-1] == advice, "the topic with the same advice")
-    counts = [len(one["remedies"]) + len(one["others"]) for one in grown]
+    wait_until(lambda: grown and grown[-1].data == response.message, "the same on the topic")
+    told = [json.loads(one.data) for one in grown]
+    counts = [len(one["remedies"]) + len(one["others"]) for one in told]
     assert counts == sorted(counts)
 
 

@@ -9,7 +9,7 @@ from nav_msgs.srv import GetMap
 from msg_adapters.results.grids import VALUES
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.ros.qos import LATCHED_QOS
-from support.grounds import make_terrain, waves
+from support.grounds import make_terrain, raised, waves
 from support.planner_client import SERVER
 from support.ros_fixtures import call, hear
 from support.waiting import wait_until
@@ -17,11 +17,9 @@ from support.waiting import wait_until
 PASSABLE, _, _, IMPASSABLE, UNKNOWN = VALUES.tolist()
 THERE = (1.5, 2.5), (1.5, 2.5)
 """Part of the map where a rock will be [m]."""
-
-
-def rock_at(place):
-    """Return waves with a rock of 0.5 m at (place, place)."""
-    return lambda x, y: waves(x, y) + 0.5 * ((abs(x - place) < 0.3) & (abs(y - place) < 0.3))
+FREE = make_terrain(waves, half=3.0, resolution=0.1)
+BLOCKED = raised(FREE, np.s_[48:53, 48:53], 0.5)
+"""Ground without and with a rock of 0.5 m at (2, 2)."""
 
 
 def hear_grids(client, *names):
@@ -58,7 +56,7 @@ def ask_for_grid(client):
 @pytest.fixture
 def mapping(start_server, client):
     server = start_server(hazard_map=True, hazard_headings=2)
-    client.send_terrain(make_terrain(waves, half=3.0, resolution=0.1))
+    client.send_terrain(FREE)
     return server
 
 
@@ -72,7 +70,7 @@ def test_a_late_subscriber_gets_the_map_and_what_changes_it(mapping, client):
     assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.05)
     assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
     wait_until(lambda: ask_for_grid(client).data == worst[-1].data, "it from the service")
-    client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
+    client.send_terrain(BLOCKED)
     for grids in (worst, best):
         wait_until(lambda grids=grids: has_rock(grids), "the rock", 60.0)
         assert is_free(grids)  # away from it
@@ -84,14 +82,14 @@ def test_switched_off_no_cell_is_free_and_switched_on_none_of_what_was_judged_be
     worst, first = hear_grids(client, "worst", "heading_1")
     wait_until(lambda: is_free(worst) and is_free(first), "the map", 60.0)
     judged, go_on = hold(HazardTopics, "_show")
-    client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.001, half=3.0, resolution=0.1))
+    client.send_terrain(raised(FREE, np.s_[:], 0.001))
     assert judged.wait(60.0), "the classes on the second map"
     assert client.set_parameter("hazard_map", False)[0]
     for grids in (worst, first):
         wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
     assert ask_for_grid(client).info.width == 0
     client.wait_for_log("get_hazard_map: an empty grid, the parameter hazard_map is false")
-    client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
+    client.send_terrain(BLOCKED)
     assert client.set_parameter("hazard_map", True)[0]
     before = len(worst)
     go_on.set()

@@ -37,25 +37,24 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
     assert json.loads(verdict["ground_classes"].replace("'", '"')) == {"7": 0.45}
 
 
-def test_a_marked_place_stays_impassable_until_places_are_cleared(shared, capfd):
-    server, client = shared.server, shared.client
-    sender = client.create_publisher(String, f"{SERVER}/mark_place", TOPIC_QOS)
-    place = {"x": GOAL[0], "y": GOAL[1], "radius": 0.3, "reason": "dust", "date": "today"}
-    for text in ("no JSON", json.dumps(place)):
+def test_places_marked_before_and_after_the_start_stay_impassable_until_they_are_cleared(
+    start_server, client, capfd
+):
+    latched, sender = (
+        client.create_publisher(String, f"{SERVER}/mark_place", qos)
+        for qos in (RESULT_QOS, TOPIC_QOS)
+    )
+    place = {"x": GOAL[0], "y": GOAL[1], "radius": 0.3, "reason": "dust"}
+    for date in ("before", "yesterday"):
+        latched.publish(String(data=json.dumps(place | {"date": date})))
+    server = start_server(planner="fan")
+    client.send_terrain(make_terrain(waves))
+    for text in ("no JSON", json.dumps(place | {"date": "today"})):
         client.send(sender, String(data=text))
-    wait_until(lambda: server.service.marked.places, "the place")
+    wait_until(lambda: len(server.service.marked.places) == 3, "the places")
     assert not client.can_traverse(START, GOAL).poses
     clearer = client.create_client(Trigger, f"{SERVER}/clear_places")
-    assert call(clearer, Trigger.Request()).message == "1 marked places cleared"
+    assert call(clearer, Trigger.Request()).message == "3 marked places cleared"
     assert client.can_traverse(START, GOAL).poses
     time.sleep(2.0 * EVENT_PERIOD)
     assert "New publisher" not in capfd.readouterr().err  # that no message of it will be received
-
-
-def test_a_server_that_starts_anew_knows_the_places_that_were_marked_before(start_server, client):
-    sender = client.create_publisher(String, f"{SERVER}/mark_place", RESULT_QOS)
-    place = {"x": 0.0, "y": 0.0, "radius": 0.3, "reason": "dust"}
-    for date in ("yesterday", "today"):
-        sender.publish(String(data=json.dumps(place | {"date": date})))
-    server = start_server()
-    wait_until(lambda: len(server.service.marked.places) == 2, "the places")

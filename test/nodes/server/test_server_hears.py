@@ -100,6 +100,17 @@ def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, c
     wait_for(DiagnosticStatus.ERROR, "ZeroDivisionError")
 
 
+def test_parameters_of_cells_and_gaps_act_on_the_map_that_is_there(start_server, client):
+    server = start_server(max_gap=0.5)
+    client.send_terrain(raised(make_terrain(waves), np.s_[80:82, 80:82], np.nan))
+    changed = {"map_resolution": 0.05, "unknown_cells": "interpolate"}
+    changes = [Parameter(name, value=value) for name, value in changed.items()]
+    assert run_in_executor(server, lambda: server.set_parameters_atomically(changes)).successful
+    wait_until(lambda: np.isfinite(server.service.terrain.elevation).all(), "the gap filled")
+    assert client.set_parameter("map_resolution", 0.1)[0]
+    wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.1), "the new cells")
+
+
 def test_each_client_can_tell_its_own_verdict(shared):
     client = shared.client
     client.heard["verdict"].clear()
@@ -119,21 +130,3 @@ def test_each_client_can_tell_its_own_verdict(shared):
         assert verdict["path_hash"] == path_hash(plan)
         stamp = f"{plan.header.stamp.sec}.{plan.header.stamp.nanosec:09d}"
         assert verdict["path_stamp"] == stamp
-
-
-def test_map_parameters_act_on_the_map_that_is_there(shared):
-    server, client = shared.server, shared.client
-    assert server.service.terrain.resolution == pytest.approx(0.05)
-    assert client.set_parameter("map_resolution", 0.1)[0]
-    wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.1), "the new cells")
-    assert client.set_parameter("map_resolution", 0.0)[0]
-    wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.05), "the old ones")
-
-
-def test_cells_and_gaps_of_the_map_that_is_there_change_together(start_server, client):
-    server = start_server(max_gap=0.5)
-    client.send_terrain(raised(make_terrain(waves), np.s_[80:82, 80:82], np.nan))
-    changed = {"map_resolution": 0.05, "unknown_cells": "interpolate"}
-    changes = [Parameter(name, value=value) for name, value in changed.items()]
-    assert run_in_executor(server, lambda: server.set_parameters_atomically(changes)).successful
-    wait_until(lambda: np.isfinite(server.service.terrain.elevation).all(), "the gap filled")
