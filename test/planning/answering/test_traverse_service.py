@@ -47,9 +47,10 @@ def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
     assert whole.classes == ()
 
 
-def test_a_goal_off_the_map_has_a_way_to_the_frontier_if_that_is_wanted():
+@pytest.mark.parametrize("planner", ["auto", "lattice"])
+def test_a_goal_off_the_map_has_a_way_to_the_frontier_if_that_is_wanted(planner):
     wanted = {"search_frontier": True, "lattice_cell": 0.25, "search_budget": 60.0}
-    service = make_service(make_terrain(waves, 0.1, 2.0), planner="auto", **wanted)
+    service = make_service(make_terrain(waves, 0.1, 2.0), planner=planner, **wanted)
     start, goal = (-1.0, 0.0, 0.0), (2.5, 0.0, 0.0)
     judged = service.snapshot().answer(start, goal)
     assert judged.traversable and 0.5 < judged.search.goal_offset < 1.5
