@@ -79,10 +79,18 @@ def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones
     assert run_study(task).baseline.values == (0.31,)
 
 
+WHEEL = {"name": "wheel.radius", "from": 1e8, "to": 1e9, "count": 2}
+MANY = [
+    {"name": name, "from": 0.5, "to": 0.9, "count": 1000}
+    for name in ("wheel.radius", "wheel.width", "wheel.mass", "masses.body.mass")
+]
+WORST = {"objective": "worst_utilisation"}
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"objective": "worst_utilisation"}, "drives is missing"),
+        (WORST, "drives is missing"),
         ({"parameters": [PIVOT_X | {"name": "wheel.radios"}]}, "wheel.radius"),
         ({"parameters": [PIVOT_X | {"to": 0.0}]}, "above from"),
         ({"parameters": [PIVOT_X, PIVOT_X]}, "no other parameter varies"),
@@ -90,33 +98,15 @@ def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones
         ({"soil": "dry_sand"}, "left out"),
         ({"objective": "tip_over_margin", "drives": [{"length": 1.0}]}, "one of slope"),
         ({"objective": "tip_over_margin", "drives": [{"slope": 3}]}, "slope is 3 at most 1.5"),
-    ],
-)
-def test_what_a_study_file_must_not_say_is_refused_by_name(changes, text):
-    with pytest.raises(RoverFileError, match=r".*".join(text.split())):
-        study(**changes)
-
-
-WHEEL = {"name": "wheel.radius", "from": 1e8, "to": 1e9, "count": 2}
-MANY = [
-    {"name": name, "from": 0.5, "to": 0.9, "count": 1000}
-    for name in ("wheel.radius", "wheel.width", "wheel.mass", "masses.body.mass")
-]
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"drives": [{"slope": 0.1, "length": 1e300}]}, r"a drive is 1e\+300 m long; it must be"),
-        ({"drives": [{"slope": 0.1, "length": 1e3}]}, r"a ground of 2e\+03 m in cells of 0.02 m"),
+        (WORST | {"drives": [{"slope": 0.1, "length": 1e300}]}, r"a drive is 1e\+300 m long"),
+        (WORST | {"drives": [{"slope": 0.1, "length": 1e3}]}, r"a ground of 2e\+03 m in cells"),
         ({"parameters": MANY}, r"parameters have 1e\+12 combinations"),
-        ({"parameters": [WHEEL], "objective": "tallest_step"}, "no rover of .* could be judged"),
+        ({"parameters": [WHEEL], "objective": "tallest_step"}, "no rover of could be judged"),
     ],
 )
-def test_an_impossible_study_is_refused(changes, text):
-    objective = {"objective": "worst_utilisation"} if "drives" in changes else {}
-    with pytest.raises((PlanningError, RoverFileError), match=text):
-        _ = run_study(study(**objective, **changes)).best
+def test_an_impossible_study_is_refused_by_name(changes, text):
+    with pytest.raises((PlanningError, RoverFileError), match=r".*".join(text.split())):
+        _ = run_study(study(**changes)).best
 
 
 @pytest.mark.parametrize("name", preset_names())

@@ -41,12 +41,6 @@ def walker(**changes: Any) -> dict[str, Any]:
     return data | changes
 
 
-def refusal(**changes: Any) -> str:
-    with pytest.raises(RoverFileError) as raised:
-        read_as(Walker, walker(**changes), "a walker file")
-    return str(raised.value)
-
-
 def test_contents_become_the_type_with_lists_as_tuples_and_integers_as_floats():
     read = read_as(Walker, walker(tail={"length": 2, "swing": [0, 1]}), "a walker file")
     assert read == Walker(
@@ -77,7 +71,9 @@ def test_contents_become_the_type_with_lists_as_tuples_and_integers_as_floats():
     ],
 )  # fmt: skip
 def test_an_error_names_key_value_and_rule(changes, text):
-    assert refusal(**changes) == text
+    with pytest.raises(RoverFileError) as raised:
+        read_as(Walker, walker(**changes), "a walker file")
+    assert str(raised.value) == text
 
 
 def test_errors_name_the_part_of_a_file_from_the_top_and_open_with_the_file():

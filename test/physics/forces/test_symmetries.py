@@ -63,11 +63,9 @@ def test_mirrored_ground_swaps_right_and_left(seed, curvature):
 
 def test_bounds_on_mirrored_ground_swap_right_and_left():
     """They depended on which wheels are first, by up to a hundredth."""
-    ground, poses = smooth(3), random_poses(3, 12, 0.6)
-    flipped, path = mirrored(ground, poses)
-    ahead = np.zeros(len(poses))
-    here = judge_poses(LSR1, with_std(ground, 0.003), poses, ahead)[0].bounds
-    there = judge_poses(LSR1, with_std(flipped, 0.003), path, -ahead)[0].bounds
+    ground, poses = with_std(smooth(3), 0.003), random_poses(3, 12, 0.6)
+    here = judge_poses(LSR1, ground, poses)[0].bounds
+    there = judge_poses(LSR1, *mirrored(ground, poses))[0].bounds
     assert here.bounded.all()
     expected = here.friction_utilisation[:, SWAP]
     assert there.friction_utilisation == pytest.approx(expected, rel=3e-4)

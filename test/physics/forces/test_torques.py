@@ -156,7 +156,9 @@ def test_ranges_lie_between_those_of_linear_programs_without_policy_and_margin(
     optimal = judge_path(LSR1, ground, poses, physical)[0]
     compared, slack = 0, 1e-5 * max_torque
     for i in np.flatnonzero(ranges.feasible):
-        if has_equal_shares(optimal, i) != shared:
+        along, S = balance_matrix(LSR1, optimal, i)[2][:, 1], optimal.lateral[i]
+        left = S - np.polyval(np.polyfit(along, S, 1), along)
+        if (np.abs(left).max() <= 1e-6 * LSR1.weight) != shared:
             continue
         for wheel in range(6):
             compared += 1
@@ -167,13 +169,6 @@ def test_ranges_lie_between_those_of_linear_programs_without_policy_and_margin(
             assert widest[0] - slack <= ranges.lowest[i, wheel] <= within[0] + slack
             assert within[1] - slack <= ranges.highest[i, wheel] <= widest[1] + slack
     assert compared >= 6
-
-
-def has_equal_shares(prediction, i) -> bool:
-    along = balance_matrix(LSR1, prediction, i)[2][:, 1]
-    S = prediction.lateral[i]
-    left = S - np.polyval(np.polyfit(along, S, 1), along)
-    return bool(np.abs(left).max() <= 1e-6 * LSR1.weight)
 
 
 @settings(max_examples=10)

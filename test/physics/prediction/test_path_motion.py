@@ -39,12 +39,6 @@ def spot(turn=2.0 * np.pi, count=37):
     return poses_at(0.0, 0.0, np.linspace(0.0, turn, count))
 
 
-def with_chord_headings(poses):
-    """Return poses that point to the next place, the last one as the one before it."""
-    ahead = np.arctan2(*np.diff(poses[:, :2], axis=0).T[::-1])
-    return poses_at(*poses[:, :2].T, np.append(ahead, ahead[-1]))
-
-
 @given(st.floats(-3.1, 3.1), st.booleans())
 def test_a_straight_path_is_exactly_straight(yaw, backward):
     poses = straight(yaw=yaw)[:: -1 if backward else 1]
@@ -65,7 +59,9 @@ def test_an_arc_has_its_curvature_whatever_its_sampling(curvature, spacing, side
 
 @given(st.floats(0.2, 1.5), st.sampled_from([0.05, 0.1, 0.3]))
 def test_an_arc_whose_headings_follow_its_chords_is_an_arc(curvature, spacing):
-    found = motions(with_chord_headings(arc(curvature, spacing)))
+    x, y, _ = arc(curvature, spacing).T
+    ahead = np.arctan2(np.diff(y), np.diff(x))
+    found = motions(poses_at(x, y, np.append(ahead, ahead[-1])))
     assert (found[:, 1] == 0.0).all()
     assert found[1:-1, 2] == pytest.approx(np.full(len(found) - 2, curvature * SPEED), rel=0.02)
 

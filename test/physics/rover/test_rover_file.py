@@ -12,6 +12,7 @@ from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
 from rover_physics.rover.model import Steering
 from rover_physics.rover.rover_file import preset_names, rover_from_dict, rover_to_dict
+from rover_physics.rover.uncertainty import Uncertainty
 
 NAN, INF = float("nan"), float("inf")
 OPTIONAL = ("manipulator", "manipulator.payload", "steering", "wheel.servo_droop")
@@ -21,8 +22,8 @@ OPTIONAL = ("manipulator", "manipulator.payload", "steering", "wheel.servo_droop
 LSR1 = yaml.safe_load(find_config("rovers/lsr1.yaml").read_text(encoding="utf-8"))
 
 
-def changed(key: str, *value: object) -> dict[str, Any]:
-    """Return the lsr1 file with one dotted key set, or left out without a value."""
+def read(key: str, *value: object) -> Rover:
+    """Read the lsr1 file with one dotted key set, or left out without a value."""
     data = place = copy.deepcopy(LSR1)
     *sections, last = key.split(".")
     for section in sections:
@@ -30,11 +31,7 @@ def changed(key: str, *value: object) -> dict[str, Any]:
     place.pop(last, None)
     if value:
         (place[last],) = value
-    return data
-
-
-def read(key: str, *value: object) -> Rover:
-    return rover_from_dict(changed(key, *value), "test")
+    return rover_from_dict(data, "test")
 
 
 def refusal(key: str, *value: object) -> str:
@@ -78,6 +75,7 @@ def test_optional_keys_may_be_left_out_or_empty_and_integers_are_numbers():
     arm = read("manipulator.joint_limits", limits).manipulator
     assert arm.joint_limits == tuple(map(tuple, limits))
     assert read("manipulator.joint_limits").manipulator.joint_limits is None
+    assert read("uncertainty.friction", 0.2).uncertainty == Uncertainty(friction=0.2)
 
 
 @pytest.mark.parametrize("key", [key for key in all_keys(LSR1) if key not in OPTIONAL])
@@ -116,6 +114,7 @@ def test_every_number_is_a_finite_number_of_its_sign(wrong):
         *[("masses.body.com", value, "between the wheels")
           for value in ([1.0, 0.0, 0.05], [0.0, 0.9, 0.05])],
         ("uncertainty.mass", 2.0, "at most 0.35 of masses.body.mass, 1.75 kg"),
+        ("uncertainty.friction", -0.1, "at least 0"),
         ("manipulator.joints", ["a", "b", "b"], "a list of 3 different names"),
         ("manipulator.joints", ["a", "b", "rocker_left"], "belongs to the suspension"),
         ("manipulator.link_lengths", [0.1, -0.3, 0.3], "negative"),
@@ -139,12 +138,9 @@ def test_a_stowed_arm_outside_its_limits_and_pivots_of_a_bogie_behind_are_refuse
         rover_from_dict(data, "test")
 
 
-def test_an_unknown_limit_lists_the_keys_that_a_file_may_have():
+def test_an_unknown_name_lists_the_keys_or_presets_that_there_are_or_where_was_searched():
     with pytest.raises(RoverFileError, match=r"limits\.tilted; did you mean tilt\?.* wheel_drop$"):
         read("limits.tilted", 1.0)
-
-
-def test_an_unknown_name_lists_the_presets_or_where_was_searched():
     with pytest.raises(RoverFileError, match="no rover 'lsr2'.*presets are lsr1, m2020"):
         load_rover("lsr2")
     with pytest.raises(RoverError, match=r"no configuration file 'rovers/none\.yaml'; searched /"):

@@ -24,11 +24,17 @@ from rover_physics.rover.urdf.robot import parse_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from support.project.checkout import TOP
 from support.rover_geometry import place_rover
+from support.rovers import LSR1
+
+WHEEL = replace(LSR1.wheel, servo_droop=0.2, torque_per_current=0.7)
+UNUSUAL = replace(LSR1, wheel=WHEEL, uncertainty=Uncertainty(mass=0.3))
+"""A rover with values other than the usual ones, of which a URDF tells nothing."""
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_a_rover_comes_back_from_its_urdf_and_its_file(name, tmp_path):
-    rover = load_rover(name)
+@pytest.mark.parametrize(
+    "rover", [*map(load_rover, preset_names()), UNUSUAL], ids=[*preset_names(), "unusual"]
+)
+def test_a_rover_comes_back_from_its_urdf_and_joint_map_and_from_its_file(rover, tmp_path):
     write_urdf(tmp_path / "rover.urdf", rover)
     save_yaml(tmp_path / "joints.yaml", map_of(rover))
     read = rover_from_urdf(tmp_path / "rover.urdf", tmp_path / "joints.yaml")
@@ -36,15 +42,6 @@ def test_a_rover_comes_back_from_its_urdf_and_its_file(name, tmp_path):
     assert read.asymmetry < 1e-9 and read.levelling == Levelling()
     save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
     assert load_rover(str(tmp_path / "rover.yaml")) == rover
-
-
-def test_what_a_urdf_does_not_tell_comes_back_by_the_joint_map(tmp_path):
-    preset = load_rover("lsr1")
-    wheel = replace(preset.wheel, servo_droop=0.2, torque_per_current=0.7)
-    rover = replace(preset, wheel=wheel, uncertainty=Uncertainty(mass=0.3))
-    write_urdf(tmp_path / "rover.urdf", rover)
-    save_yaml(tmp_path / "joints.yaml", map_of(rover))
-    assert rover_from_urdf(tmp_path / "rover.urdf", tmp_path / "joints.yaml").rover == rover
 
 
 def foreign_urdf() -> str:

@@ -75,22 +75,15 @@ def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(cours
     assert stopped.codes == verdict.codes[:count]
 
 
-def steps_down(step: float) -> Terrain:
-    """Return stairs down along x, 0.4 m from edge to edge, so that wheels fall again and again."""
-    return make_terrain(lambda x, y: -step * np.floor(np.maximum(x + 4.0, 0.0) / 0.4), 0.04, 6.0)
-
-
-def unknown(start: float) -> Terrain:
-    hidden = np.arange(GROUND.elevation.shape[1]) * GROUND.resolution > start
-    return replace(GROUND, elevation=np.where(hidden, np.nan, GROUND.elevation))
-
-
+STAIRS = make_terrain(lambda x, y: -0.16 * np.floor(np.maximum(x + 4.0, 0.0) / 0.4), 0.04, 6.0)
+"""Stairs down along x, 0.4 m from edge to edge, so that wheels fall again and again."""
+HALF_KNOWN = replace(GROUND, elevation=np.where(np.arange(301) > 200, np.nan, GROUND.elevation))
 CASES = {
     "backwards": (GROUND, straight(-3.0)[::-1].copy(), SweepOptions(backward=True)),
     "slippery": (GROUND, straight(-1.0), SweepOptions(friction=0.4)),
     "margin": (GROUND, straight(3.0), SweepOptions("optimal", control_margin=0.3, friction=0.5)),
-    "ledges": (steps_down(0.16), straight(0.0), SweepOptions()),
-    "unknown ground": (unknown(8.0), straight(-3.0), SweepOptions()),
+    "ledges": (STAIRS, straight(0.0), SweepOptions()),
+    "unknown ground": (HALF_KNOWN, straight(-3.0), SweepOptions()),
     "uncertain": (with_std(GROUND, 0.003), straight(-3.0, 2.0), SweepOptions(friction=0.7)),
     "servos": (
         drive_ground("bump_one_side", 0.18),
@@ -112,21 +105,17 @@ def test_where_a_rover_fails_and_stays_while_a_wheel_goes_over_an_edge_its_path_
     assert (verdict.code, verdict.first_failure) == ("tilt", row)
 
 
-def judge_in_parts(terrain, poses, options):
-    """Return the predictions of all parts, and the verdict."""
-    judge = PartwiseJudge(ROVER, terrain, poses, options)
-    taken = list(judge.parts())
-    return taken, judge.verdict()
-
-
 @pytest.mark.parametrize("case", CASES)
-def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, monkeypatch):
+def test_numbers_and_verdict_of_small_parts_are_those_of_the_whole_path(case, monkeypatch):
     monkeypatch.setattr(sweep, "PART", 17)
     terrain, poses, options = CASES[case]
     whole, verdict = judge_path(ROVER, terrain, poses, options)
     cut, stopped = judge_path(ROVER, terrain, poses, options, stop_at_failure=True)
     assert first_refusal(stopped) == first_refusal(verdict)
-    taken, found = judge_in_parts(terrain, poses, options)
+    judge = PartwiseJudge(ROVER, terrain, poses, options)
+    taken = list(judge.parts())
+    longest = max(len(part.poses) for part in taken)  # also where nothing settles
+    assert longest <= 17 or case == "servos", "their drift looks far back"
     apart = 1e-9 if options.policy == "servo" else 0.0  # drift adds up in parts
     for name in ("poses", "status", *(one.name for one in QUANTITIES)):
         values = np.concatenate([getattr(part, name) for part in taken])
@@ -136,15 +125,8 @@ def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, monkeypat
     for name in BOUNDED_VALUES if whole.bounds else ():
         values = np.concatenate([getattr(part.bounds, name) for part in taken])
         np.testing.assert_array_equal(values, getattr(whole.bounds, name), err_msg=name)
-    assert found.to_dict() == verdict.to_dict()
+    assert judge.verdict().to_dict() == verdict.to_dict()
     assert (verdict.code == "trapped") == (case == "trap")
-
-
-def test_no_part_is_much_longer_than_asked_even_where_nothing_settles(monkeypatch):
-    monkeypatch.setattr(sweep, "PART", 50)
-    taken, verdict = judge_in_parts(unknown(0.0), straight(-3.0), SweepOptions())
-    assert verdict.code == "unknown_ground"
-    assert max(len(part.poses) for part in taken) <= 50
 
 
 def random_pieces(count, seed, half=2.0):
@@ -202,21 +184,15 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
     assert exposure == pytest.approx(prediction.time[-1], rel=0.01)
 
 
-def random_course(rover, make, seed: int) -> tuple[Terrain, np.ndarray]:
-    """Return a rough ground in the rover's size, and a straight path over it in any direction."""
-    rng, ground = np.random.default_rng(seed), make(seed)
-    yaw, (x, y) = rng.uniform(-np.pi, np.pi), rng.uniform(-0.4, 0.4, 2)
-    return scaled_for(rover, ground, straight(y, 1.0, x, yaw))
-
-
 @pytest.mark.parametrize(
     ("name", "make", "seed", "friction"),
     [("lsr1", rocky, 34, 1.0), ("lsr1", fractal, 830, 0.3), ("m2020", fractal, 230, 0.3)],
 )
 def test_twice_as_many_waypoints_change_no_verdict(name, make, seed, friction):
     """Each of them hid a peak of friction, or the begin of a fall, between its waypoints."""
-    rover = load_rover(name)
-    terrain, path = random_course(rover, make, seed)
+    rover, rng = load_rover(name), np.random.default_rng(seed)
+    yaw, (x, y) = rng.uniform(-np.pi, np.pi), rng.uniform(-0.4, 0.4, 2)
+    terrain, path = scaled_for(rover, make(seed), straight(y, 1.0, x, yaw))
     middles = 0.5 * (path[1:] + path[:-1])
     refined = np.insert(path, np.arange(1, len(path)), middles, axis=0)
     coarse, fine = (

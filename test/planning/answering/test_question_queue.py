@@ -80,23 +80,16 @@ def test_a_sweep_stops_at_the_deadline_of_its_question(desk):
     assert desk.wait(1) == [("sweep", TOO_LONG)]
 
 
-def test_a_question_that_never_began_is_busy(desk):
-    desk.ask("first", desk.work_on)
-    desk.ask("second", lambda _: 5)
-    assert desk.begun.wait(20.0)
-    desk.now = 2.0
-    assert desk.wait(2) == [("first", TOO_LONG), ("second", BUSY)]
-
-
-def test_beyond_the_queue_the_answer_is_busy_at_once_and_who_waits_gets_one(desk):
-    desk.max_waiting = 1
+def test_beyond_the_queue_the_answer_is_busy_at_once_and_who_waits_gets_one_in_its_time(desk):
+    desk.max_waiting = 2
     desk.ask("works", desk.work_on)
     assert desk.begun.wait(20.0)
     desk.ask("waits", lambda _: 5, seconds=20.0)
+    desk.ask("waits too long", lambda _: 5)
     desk.ask("too many", lambda _: 6)
     assert desk.wait(1) == [("too many", BUSY)]
     desk.now = 2.0
-    assert desk.wait(3)[1:] == [("works", TOO_LONG), ("waits", 5)]
+    assert desk.wait(4)[1:] == [("works", TOO_LONG), ("waits", 5), ("waits too long", BUSY)]
 
 
 def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_dropped(desk):

@@ -49,8 +49,8 @@ def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
 
 @pytest.mark.parametrize("planner", ["auto", "lattice"])
 def test_a_goal_off_the_map_has_a_way_to_the_frontier_if_that_is_wanted(planner):
-    wanted = {"planner": planner, "search_frontier": True, "lattice_cell": 0.25}
-    service = make_service(make_terrain(waves, 0.1, 2.0), search_budget=60.0, **wanted)
+    wanted = {"search_frontier": True, "lattice_cell": 0.25, "search_budget": 60.0}
+    service = make_service(make_terrain(waves, 0.1, 2.0), planner=planner, **wanted)
     start, goal = (-1.0, 0.0, 0.0), (2.5, 0.0, 0.0)
     judged = service.snapshot().answer(start, goal)
     assert judged.traversable and 0.5 < judged.search.goal_offset < 1.5
@@ -179,7 +179,7 @@ def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     assert moved[:, [2, 5]].sum() > stowed[:, [2, 5]].sum()
 
 
-def test_densify_keeps_the_given_poses_and_the_spacing():
+def test_densify_keeps_the_given_poses_and_the_spacing_and_refuses_an_endless_path():
     poses = np.array([[0.0, 0.0, 3.0], [0.1, 0.0, -3.0], [0.1, 0.0, 0.0], [0.1, 0.05, 0.0]])
     dense, next_given = densify(poses, 0.02)
     assert len(dense) == 5 + 1 + 3 + 1
@@ -189,9 +189,6 @@ def test_densify_keeps_the_given_poses_and_the_spacing():
     assert next_given.tolist() == [0, 1, 1, 1, 1, 1, 2, 3, 3, 3]
     turned = np.abs(np.diff(np.unwrap(dense[:6, 2])))
     np.testing.assert_allclose(turned, (2 * math.pi - 6.0) / 5)
-
-
-def test_densify_refuses_an_endless_path():
     with pytest.raises(PlanningError, match="more than 100000 waypoints"):
         densify(np.array([[0.0, 0.0, 0.0], [1e300, 0.0, 0.0]]), 0.02)
 

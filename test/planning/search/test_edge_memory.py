@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search import edge_memory
@@ -22,14 +21,6 @@ OPTIONS = PathQueryOptions(accepted_chance=1.0)
 WAY = np.column_stack([np.linspace(-1.5, 1.5, 151), np.zeros((151, 2))])
 
 
-def change_at_random(before: Terrain, rng: np.random.Generator) -> Terrain:
-    """Return the ground with other or unknown heights in a rectangle anywhere."""
-    rows, columns = (np.sort(rng.integers(0, size + 1, 2)) for size in before.elevation.shape)
-    part = slice(*rows), slice(*np.minimum(columns, columns[0] + 20))
-    rough = rng.normal(0.0, 0.05, before.elevation[part].shape)
-    return raised(before, part, (rough, 3.0, np.nan)[rng.integers(3)])
-
-
 @pytest.mark.parametrize("policy", ["equal", "optimal", "servo"])
 @pytest.mark.parametrize("ground", [rocky(5), make_terrain(waves)], ids=["rocks", "waves"])
 def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(ground, policy):
@@ -41,7 +32,11 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
         assert repr(part.verdict) == repr(whole.verdict)  # NaN is not equal to NaN
         assert_same(part.prediction, whole.prediction)
         assert_same(part.prediction.between, whole.prediction.between)
-        ground = change_at_random(ground, rng)
+        # Other or unknown heights in a rectangle anywhere.
+        rows, columns = (np.sort(rng.integers(0, size + 1, 2)) for size in ground.elevation.shape)
+        changed = slice(*rows), slice(*np.minimum(columns, columns[0] + 20))
+        rough = rng.normal(0.0, 0.05, ground.elevation[changed].shape)
+        ground = raised(ground, changed, (rough, 3.0, np.nan)[rng.integers(3)])
 
 
 def test_where_forgetting_fails_the_next_search_knows_nothing_of_the_old_map(monkeypatch):

@@ -3,6 +3,7 @@
 
 import json
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -116,17 +117,11 @@ def test_a_rover_may_leave_a_place_but_not_go_on_into_it():
 
 
 def test_of_many_places_only_those_that_a_path_may_reach_are_looked_at():
-    looked_at = []
-
-    class Counted(MarkedPlace):
-        def away(self, poses):
-            looked_at.append(self)
-            return super().away(poses)
-
-    places = tuple(Counted(float(x), 0.0, 0.4, "", "") for x in range(1000))
-    path = poses_at(np.linspace(4.5, 6.5, 40))
-    assert MarkedPlaces(places).find(path) == (2, places[5])
-    assert set(looked_at) == set(places[5:7])
+    places = tuple(replace(PLACE, x=float(x)) for x in range(1000))
+    path, away = poses_at(np.linspace(4.5, 6.5, 40)), MarkedPlace.away
+    with patch.object(MarkedPlace, "away", autospec=True, side_effect=away) as look:
+        assert MarkedPlaces(places).find(path) == (2, places[5])
+    assert {call.args[0] for call in look.mock_calls} == set(places[5:7])
 
 
 @pytest.mark.parametrize("change", [{"radius": -1.0}, {"x": None}, {"x": float("inf")}])
