@@ -13,7 +13,6 @@ from support.command_line import N, assert_refused, predict_arguments, write_gro
 from support.grounds import with_std
 from support.paths import poses_at
 
-
 ASSUMED = '{"rover": "lsr1", "policy": "equal"'
 SHAPES = {
     name: shape
