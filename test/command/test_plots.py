@@ -19,17 +19,12 @@ from support.grounds import make_terrain
 from support.paths import poses_at
 from support.rovers import LSR1
 
-COARSE = PathQueryOptions(count=3, spacing=0.4, waypoint_spacing=0.1)
 
-
-@pytest.fixture(scope="module")
-def holed():
-    return make_terrain(lambda x, y: np.where((x > 2.0) & (y > 2.0), np.nan, 0.0), 0.1, 6.0)
-
-
-def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, holed):
+def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path):
+    holed = make_terrain(lambda x, y: np.where((x > 2.0) & (y > 2.0), np.nan, 0.0), 0.1, 6.0)
     goals = {"A": (0, 0, 0), "B": (4, 3, 0.5), "C": (9, 0, 0)}
-    judge = PathJudge(Site(LSR1, holed, COARSE))
+    options = PathQueryOptions(count=3, spacing=0.4, waypoint_spacing=0.1)
+    judge = PathJudge(Site(LSR1, holed, options))
     answers = [
         (Goal(name, "plain", goal), judge.search((-4, 0, 0), goal)) for name, goal in goals.items()
     ]

@@ -16,18 +16,17 @@ from msg_adapters.paths import settled_path
 from msg_adapters.results.diagnostics import VERDICT, make_status, texts_of, to_json
 from msg_adapters.results.markers import GREEN, LIME, RED, path_markers
 from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
-from rover_physics import Terrain, judge_path
+from rover_physics import judge_path
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.traversability import classification
-from support.grounds import make_terrain, waves
+from support.grounds import make_terrain, plane, waves
 from support.paths import poses_at
 from support.rovers import FIXED, LSR1
 
 STAMP = Time(sec=12, nanosec=34)
 HEADER = Header(frame_id="map", stamp=STAMP)
-FLAT = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +75,7 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
 
 def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other_back():
     turned = np.linspace(0.0, 1.0, 30)
-    prediction = judge_path(LSR1, FLAT, poses_at(0.0, 0.0, turned))[0]
+    prediction = judge_path(LSR1, plane(0.0, 0.0), poses_at(0.0, 0.0, turned))[0]
     last = joint_trajectory(prediction, LSR1, HEADER).points[-1]
     reach = np.hypot([0.4, 0.0, 0.4], 0.31) / LSR1.wheel.radius
     assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)

@@ -13,9 +13,6 @@ from sensor_msgs.msg import Imu, PointCloud2, PointField
 from msg_adapters.errors import MessageError
 from msg_adapters.raw_messages import read_raw
 
-STAMP = Time(sec=7, nanosec=8)
-
-
 NUMBERS = itertools.count()
 
 
@@ -68,7 +65,7 @@ def fields_of(message, like) -> object:
     ],
 )
 def test_fields_are_those_that_rclpy_reads(message, frame):
-    message.header.frame_id, message.header.stamp = frame, STAMP
+    message.header.frame_id, message.header.stamp = frame, Time(sec=7, nanosec=8)
     read = read_raw(serialize_message(message), type(message))
     assert repr(fields_of(read, read)) == repr(fields_of(message, read))
     assert (read.header.frame_id, read.header.stamp.nanosec) == (frame, 8)

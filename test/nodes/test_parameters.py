@@ -18,12 +18,11 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.node import RoverNode, declare_parameters
 
 BARE = partial(Node, "parameter_test")
-WITH_TABLE = partial(RoverNode, "parameter_test", TraverseServerParameters)
 
 
 def follow(ros, load=lambda values: None, apply=lambda made: None):
     """Return a node that follows changes and has the values in force."""
-    node = ros.start(WITH_TABLE)
+    node = ros.start(partial(RoverNode, "parameter_test", TraverseServerParameters))
     node.follow_changes(load, apply)
     return node
 

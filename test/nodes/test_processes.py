@@ -65,18 +65,17 @@ def test_a_signal_ends_a_node_while_kernels_compile(
     assert "ready" not in end(process, how)
 
 
-def test_a_thread_that_ends_while_threads_take_priority_is_no_refusal(tmp_path, monkeypatch):
+def test_what_no_system_grants_is_told_and_zero_and_a_thread_that_has_ended_are_no_refusal(
+    tmp_path, monkeypatch
+):
+    assert take_priority(0) == ""
+    assert "realtime_priority 1000" in take_priority(1000)
     process = subprocess.Popen([sys.executable, "-c", ""])
     process.wait()
     (tmp_path / str(process.pid)).touch()
     monkeypatch.setattr("rover_planner.ros.process.THREADS", tmp_path)
     assert take_priority(3) == ""
     assert take_priority(3, [os.getpid()]) == ""
-
-
-def test_zero_asks_for_nothing_and_what_no_system_grants_is_told():
-    assert take_priority(0) == ""
-    assert "realtime_priority 1000" in take_priority(1000)
 
 
 @pytest.mark.long

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics.terrain.grid import save_terrain
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
@@ -14,7 +14,7 @@ from rover_planner.viewer.live.listener import listen
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.pages.sharing import PageLink, write_link
 from rover_planner.viewer.state.colours import UNKNOWN, to_linear
-from support.grounds import make_terrain, waves
+from support.grounds import make_terrain, plane, waves
 from support.viewer.sessions import LSR1, ask
 from support.viewer.sessions import wait_patiently as wait_until
 
@@ -23,7 +23,6 @@ pytestmark = pytest.mark.slow
 DRIVE = {"start": (0.0, 0.0, 0.0), "goal": (1.0, 0.0, 0.0), "path": 1, "time": 0.0}
 LINK = PageLink(loaded={}, rover={}, ground="0", policy="equal", soil="", **DRIVE)
 PLAN = "/lines/plan"
-LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
 
 
 @pytest.fixture
@@ -31,7 +30,7 @@ def page(ros):
     """A page that follows the graph of the test."""
     warm_up()
     with listen(ros.context) as listener:
-        served = LivePage(LSR1, LEVEL, listener)
+        served = LivePage(LSR1, plane(0.0, 0.0, half=4.0), listener)
         yield served
         served.close()
 
