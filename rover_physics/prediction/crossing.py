@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.threads import limit_threads, run_in_turn
 from rover_physics.prediction.evaluation import NONE_HELD, evaluate_poses, new_works
-from rover_physics.prediction.halving import AtFailure, Progress, Stretches
+from rover_physics.prediction.halving import CLOSED, NEXT, ROWS, AtFailure, Stretches
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     HEIGHT_JUMP,
@@ -132,9 +132,9 @@ def _halve(model: PackedModel, pairs: Crossings, searched: Searched) -> Crossing
     numbers = np.array([first, first + stretches, 0])
     ends = np.vstack([np.zeros((first, 2), np.int64), np.arange(first).reshape(-1, 2)])
     closed, works, found = np.empty((0, 2), np.int64), new_works(1, 1), pairs
-    while numbers[Progress.NEXT] < numbers[Progress.ROWS]:
+    while numbers[NEXT] < numbers[ROWS]:
         check_interruption()
-        more = numbers[Progress.ROWS] - len(found.place) + POSES_IN_STRETCH * stretches + 2
+        more = numbers[ROWS] - len(found.place) + POSES_IN_STRETCH * stretches + 2
         found = join_crossings([found, _unasked(more)])
         rows = len(found.place)
         ends, closed = (np.resize(rows_of, (rows, 2)) for rows_of in (ends, closed))
@@ -142,9 +142,9 @@ def _halve(model: PackedModel, pairs: Crossings, searched: Searched) -> Crossing
         places = found.poses, np.empty((rows, 3)), NONE_HELD
         sweep = model.records[None], model.limits.records, *places, asked, works, found.results
         evaluate_poses(*sweep, 0, 1)
-    end, (last, path_of, *_) = numbers[Progress.ROWS], searched
+    end, (last, path_of, *_) = numbers[ROWS], searched
     forget_uncomputable(found.results[first:end])
-    closed = closed[: numbers[Progress.CLOSED]]
+    closed = closed[: numbers[CLOSED]]
     waypoint = found.waypoint[closed[:, 0]]
     climbs = climb_faces(model, found, closed[waypoint <= last[path_of[waypoint]]])
     settled = found.results["status"][first:end] != PoseStatus.NOT_SETTLED

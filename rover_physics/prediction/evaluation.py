@@ -17,7 +17,7 @@ from rover_physics.forces.stability import CORNERS, find_support, tip_over_angle
 from rover_physics.forces.torques import TORQUE_SEARCH, apply_torques, minimise_friction
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
-from rover_physics.prediction.halving import Progress, ask_middle, halve
+from rover_physics.prediction.halving import NEXT, ROWS, ask_middle, halve
 from rover_physics.results.uses import find_broken
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
 from rover_physics.rover.steered_drive import steer_wheels
@@ -134,7 +134,7 @@ def evaluate_poses(
     for chunk in range(first_chunk, end_chunk):
         i, end = n * chunk // chunks, n * (chunk + 1) // chunks
         if divides:
-            i, end = stretches.numbers[Progress.NEXT], stretches.numbers[Progress.ROWS]
+            i, end = stretches.numbers[NEXT], stretches.numbers[ROWS]
         while i < end and (not divides or end + 2 <= n):
             if divides and not ask_middle(stretches, poses, motions, results, i):
                 results[i].status = PoseStatus.NOT_SETTLED.value
@@ -144,10 +144,10 @@ def evaluate_poses(
                 _evaluate_rows(models, limits, works[chunk], results, i)
                 if divides:
                     halve(stretches, models[0, 0], limits, poses, results, i)
-                    end = stretches.numbers[Progress.ROWS]
+                    end = stretches.numbers[ROWS]
             i += 1
         if divides:
-            stretches.numbers[Progress.NEXT] = i
+            stretches.numbers[NEXT] = i
 
 
 @kernel

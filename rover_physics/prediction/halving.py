@@ -34,15 +34,9 @@ class AtFailure(IntEnum):
     """Its whole path."""
 
 
-class Progress(IntEnum):
-    """The numbers of `Stretches.numbers`."""
-
-    NEXT = 0
-    """The row that is evaluated next."""
-    ROWS = 1
-    """The number of rows that are known or asked for."""
-    CLOSED = 2
-    """The number of closed stretches."""
+NEXT, ROWS, CLOSED = 0, 1, 2
+"""Places in `Stretches.numbers` of the row that is evaluated next, of the number of rows that are
+known or asked for, and of that of closed stretches."""
 
 
 class Stretches(NamedTuple):
@@ -57,7 +51,7 @@ class Stretches(NamedTuple):
     closed: np.ndarray
     """(rows, 2) ends of stretches in which a contact still jumps, but that are at one place."""
     numbers: np.ndarray
-    """(3,) see Progress."""
+    """(3,) see NEXT, ROWS, CLOSED."""
     last: np.ndarray
     """(paths,) last waypoint of each path that is searched; may be shared by threads."""
     path: np.ndarray
@@ -129,13 +123,13 @@ def _sort_half(stretches, model, poses, results, before, after):
     if is_place and jumps_between(model, results[before], results[after]):
         _close(stretches, before, after)
     elif wanted_spacing(model, results[before], results[after]) < distance:
-        row = numbers[Progress.ROWS]
+        row = numbers[ROWS]
         stretches.ends[row, 0], stretches.ends[row, 1] = before, after
-        numbers[Progress.ROWS] = row + 1
+        numbers[ROWS] = row + 1
 
 
 @exact_kernel
 def _close(stretches, before, after):
-    row = stretches.numbers[Progress.CLOSED]
+    row = stretches.numbers[CLOSED]
     stretches.closed[row, 0], stretches.closed[row, 1] = before, after
-    stretches.numbers[Progress.CLOSED] = row + 1
+    stretches.numbers[CLOSED] = row + 1

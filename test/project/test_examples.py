@@ -18,8 +18,11 @@ SHOWN = {
     "02_compare_policies": ("tallest step [cm]", "optimal "),
     "03_your_own_rover_from_a_urdf": ("kit_rover, 6.2 kg", "servo: climbs the step"),
     "04_a_map_from_a_point_cloud": ("seen, +0.35 rad: unknown", "filled, +0.35 rad: traversable"),
-    "05_find_a_path": ("straight ahead: on the way here: front_left", "search: found"),
-    "06_ask_the_server_over_ros": ("to -45.5, -20.5: 1.6 m", "to -44.0, -25.0: no: the rover"),
+    "05_find_a_path": ("straight ahead: front_right wheel drops off", "search: found"),
+    "06_ask_the_server_over_ros": (
+        "to -45.5, -20.5: 1.6 m",
+        "-25.0: no: no path within the map",
+    ),
     "07_survey_a_whole_map": ("10900 cells at 8 headings", "reachable with return: 16.6 m2"),
     "08_traction_control_against_mujoco": ("servos: arrived", "control: arrived"),
     "09_take_advice": ("rock: refused: belly clearance", "kg less at the arm's tip"),
