@@ -77,7 +77,7 @@ def test_blind_ground_is_refused_where_the_parameter_says_so():
     drive = Drive(footprint_margin=MARGIN, blind_ground="refuse")
     refused = drive.service.snapshot().answer(START, GOAL)
     assert refused.code == "blind_ground" and not refused.traversable
-    report = refused.report.to_dict()
+    report = refused.report
     assert "never seen" in refused.reason and report["first_failure"] == 0
     assert report["traversability_class"] == "passable"
     assert f"{100.0 * refused.ground.unobserved_share:.1f} %" in refused.reason
