@@ -26,9 +26,12 @@ from rover_planner.planning.search.connections import (
     connect_end,
     connect_frontier,
 )
-from rover_planner.planning.search.difficulty import estimate_difficulty, steepest_climb
+from rover_planner.planning.search.difficulty import (
+    estimate_difficulty,
+    find_groundless,
+    steepest_climb,
+)
 from rover_planner.planning.search.edge_memory import EdgeMemory
-from rover_planner.planning.search.ground_estimate import find_groundless
 from rover_planner.planning.search.judge import PathJudge, cost_of_path
 from rover_planner.planning.search.lattice_search import LatticeSearch, SearchProgress, join_pieces
 from rover_planner.planning.search.nodes import Nodes

@@ -11,8 +11,7 @@ from rover_physics.errors import ModelError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.questions import Register
-from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
-from rover_planner.planning.answering.snapshot import GivenPath
+from rover_planner.planning.answering.snapshot import GivenPath, NewerMapError, SearchWatch
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
 from support.grounds import make_terrain, raised, wall_at, waves, with_std
