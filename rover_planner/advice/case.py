@@ -23,8 +23,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.path_search import find_path
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""

@@ -50,7 +50,7 @@ def advise(
     from rover_planner.nodes.warm_up import prepare_search
     from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
     from rover_planner.planning.path_query import PathQueryOptions, waypoint_spacing_for
-    from rover_planner.planning.search.site import Site
+    from rover_planner.planning.search.query import Site
     from rover_planner.shell.progress import show_progress
 
     shared.keep_inputs((rover, terrain, poses), out, picture)

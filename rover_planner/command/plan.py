@@ -13,7 +13,7 @@ from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
-    from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+    from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 
 Out = Annotated[Path, argument("OUT", "The path with its predictions, .npz; written if found.")]
 Picture = Annotated[Path | None, picture_option("Draw the answer on the map (.png, .svg).")]
@@ -62,7 +62,6 @@ def plan(
     from rover_planner.planning.path_query import PathQueryOptions
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
     from rover_planner.planning.search.query_file import write_query
-    from rover_planner.planning.search.site import Site
 
     shared.keep_inputs((rover, terrain), out, dump, picture)
     settings = LatticeSettings(

@@ -18,7 +18,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_query import Candidate, PathAnswer
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 
 REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUND_EXTREMES, "failure_chance")
 """Fields of a verdict that a report has."""

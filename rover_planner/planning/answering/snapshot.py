@@ -28,8 +28,7 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.lattice_search import SearchProgress
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
-from rover_planner.planning.search.query import SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import SearchQuery, Site
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 REPORT_PERIOD = 0.2

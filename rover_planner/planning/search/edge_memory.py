@@ -18,8 +18,7 @@ from rover_planner.maps.layers import find_changes, have_same_layers
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, make_primitives
-from rover_planner.planning.search.query import SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import SearchQuery, Site
 
 MARGIN = BLOCK + 1
 """Distance from wheels and body within which ground counts for a pose [cells]: the kernels look at

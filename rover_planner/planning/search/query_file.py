@@ -16,8 +16,7 @@ from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 
 _ENTRY, _MOST = "way_question", 1_000_000
 

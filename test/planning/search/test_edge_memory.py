@@ -12,7 +12,7 @@ from rover_planner.planning.search import edge_memory
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.primitives import Gear, Piece
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from support.grounds import make_terrain, raised, rocky, waves
 from support.predictions import assert_same
 from support.rovers import LSR1

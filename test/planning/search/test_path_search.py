@@ -26,8 +26,7 @@ from rover_planner.planning.search.path_search import (
     find_path,
 )
 from rover_planner.planning.search.primitives import Gear, Piece
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 from support.grounds import fractal, make_terrain, pen, plane, raised, waves
 from support.paths import poses_at
 from support.rovers import LSR1
