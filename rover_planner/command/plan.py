@@ -60,8 +60,7 @@ def plan(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.planning.path_query import PathQueryOptions
-    from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-    from rover_planner.planning.search.query_file import write_query
+    from rover_planner.planning.search.query import LatticeSettings, SearchQuery, write_query
 
     shared.keep_inputs((rover, terrain), out, dump, picture)
     settings = LatticeSettings(
@@ -88,7 +87,7 @@ def replay_plan(
     max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Search the path of a question again that `plan --dump` has written."""
-    from rover_planner.planning.search.query_file import read_query
+    from rover_planner.planning.search.query import read_query
 
     shared.keep_inputs((question,), out, picture)
     asked, settings = read_query(question, max_cells)
@@ -105,7 +104,7 @@ def _ask(
     """Search the path, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
     from rover_planner.nodes.warm_up import prepare_search
-    from rover_planner.planning.assumptions import assume
+    from rover_planner.planning.path_query import assume
     from rover_planner.planning.search.path_search import find_path
     from rover_planner.shell.progress import show_progress
 

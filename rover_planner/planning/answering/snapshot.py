@@ -111,7 +111,9 @@ class GivenPath:
 
     def judge(self, snapshot: "Snapshot") -> PathJudgement:
         """Judge whether the rover can drive it; errors are those of `Snapshot.check_path`."""
-        return replace(snapshot, path=self).check_path().complete()
+        if self.poses is None:
+            return refusal(self.code, self.refusal)
+        return snapshot.check_path(self.poses).complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,27 +219,22 @@ class Snapshot:
         reason = f"{why}; the best candidate: {refused.reason}"
         return replace(refused, code=code, reason=reason, around=found)
 
-    def check_path(self, *, stop_at_failure: bool = False) -> PathJudgement:
-        """Judge the last path, if wanted only up to its first failure.
+    def check_path(
+        self, poses: NDArray[np.float64], *, stop_at_failure: bool = False
+    ) -> PathJudgement:
+        """Judge a path of poses (n, 3), if wanted only up to its first failure.
 
         Raises:
             PlanningError: The path is too long.
             RoverError: The model refuses the path.
         """
-        missing = self.refuse_if_missing()
-        if missing is not None:
-            return missing
-        assert self.path.poses is not None
+        refused = self.refuse_map()
+        if refused is not None:
+            return refused
         site = self._site()
-        poses, _ = densify(self.path.poses, site.options.waypoint_spacing)
-        path = PathJudge(site).check(poses, stop_at_failure=stop_at_failure)
+        waypoints, _ = densify(poses, site.options.waypoint_spacing)
+        path = PathJudge(site).check(waypoints, stop_at_failure=stop_at_failure)
         return self._describe(site, path)
-
-    def refuse_if_missing(self) -> PathJudgement | None:
-        """Return a refusal if there is no path or no map to use, else None."""
-        if self.path.poses is None:
-            return refusal(self.path.code, self.path.refusal)
-        return self.refuse_map()
 
     def refuse_map(self) -> PathJudgement | None:
         """Return a refusal if there is no map, or if it is too old, else None."""

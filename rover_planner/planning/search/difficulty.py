@@ -22,8 +22,8 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.angles import wrap
+from rover_planner.planning.search.edges import Primitive
 from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
-from rover_planner.planning.search.primitives import Primitive
 
 SHARE = 0.25
 """Distance of the places that are looked at [cells of the lattice], at least one of the map."""

@@ -15,9 +15,8 @@ from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.layers import find_changes, have_same_layers
-from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.edges import Edges, Piece, make_primitives
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
-from rover_planner.planning.search.primitives import Piece, make_primitives
 from rover_planner.planning.search.query import SearchQuery, Site
 
 MARGIN = BLOCK + 1

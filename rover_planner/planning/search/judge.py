@@ -45,7 +45,7 @@ from rover_planner.planning.path_query import (
     choose,
     generate_paths,
 )
-from rover_planner.planning.search.primitives import PRICES, Gear, Piece
+from rover_planner.planning.search.edges import PRICES, Gear, Piece
 from rover_planner.planning.search.query import Site
 
 CLIMB = 2.0

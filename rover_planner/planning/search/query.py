@@ -1,26 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rover on a map, a query for a path there, how it is searched, and in which part of the map."""
+"""A rover on a map, a query for a path there, how it is searched, and files that hold both."""
 
+import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.chance.samples import cut_around
-from rover_physics.errors import TerrainError
+from rover_physics.errors import RoverFileError, TerrainError
+from rover_physics.files.npz_file import open_npz
+from rover_physics.files.validation import errors_of, read_as
 from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import rover_from_dict
 from rover_physics.rover.steering_joints import swing_radius
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.maps.unobserved_ground import ALLOW, REFUSE, UNOBSERVED_CODE, ObservedGround
-from rover_planner.planning.assumptions import assume
 from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
-from rover_planner.planning.path_query import Candidate, PathQueryOptions
+from rover_planner.planning.path_query import Candidate, PathQueryOptions, assume
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
 
 MAX_NODES = 1_500_000
 """Largest number of nodes of a window; each takes 90 bytes."""
+_ENTRY, _MOST = "way_question", 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,3 +153,80 @@ def cut_out(site: Site, nodes: Nodes) -> Terrain:
         return cut_around(terrain, ends, margin)
     except TerrainError:
         return terrain
+
+
+@dataclass(frozen=True)
+class _Options:
+    """`PathQueryOptions` as the entry holds them, with the options of the model beside them."""
+
+    count: int
+    spacing: float
+    waypoint_spacing: float
+    policy: str
+    control_margin: float
+    friction: float | None
+    max_torque: float | None
+    soil: str | None
+    payload: float | None
+    map_sigmas: float
+    accepted_chance: float = 1.0
+
+
+@dataclass(frozen=True)
+class _Content:
+    """Content of the entry: a question for a path and the settings of its search."""
+
+    rover: dict[str, Any]
+    start: tuple[float, float, float]
+    goal: tuple[float, float, float]
+    options: _Options
+    joint_angles: dict[str, float] | None
+    settings: LatticeSettings
+
+
+def write_query(path: Path, question: SearchQuery, settings: LatticeSettings) -> None:
+    """Write a question to a terrain file (.npz) with one more entry; an old file is replaced.
+
+    Raises:
+        TerrainError: The file cannot be written.
+    """
+    site = question.site
+    options = asdict(site.options)
+    options |= options.pop("model")
+    text = json.dumps(
+        {
+            "rover": asdict(site.rover),
+            "start": np.asarray(question.start).tolist(),
+            "goal": np.asarray(question.goal).tolist(),
+            "options": {field.name: options[field.name] for field in fields(_Options)},
+            "joint_angles": site.options.model.arm_angles,
+            "settings": asdict(settings),
+        }
+    )
+    save_terrain(path, site.terrain, **{_ENTRY: text})
+
+
+def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, LatticeSettings]:
+    """Read a question that `write_query` has written.
+
+    Args:
+        path: The file.
+        max_cells: Largest terrain [cells].
+
+    Raises:
+        TerrainError: The terrain in the file is none, or too large.
+        PlanningError: The file holds no question.
+        RoverError: Something in the question is not what it should be.
+    """
+    terrain = load_terrain(path, max_cells)
+    try:
+        with errors_of(path), open_npz(path) as file:
+            content = json.loads(str(file.read(_ENTRY, most=_MOST)))
+    except (RoverFileError, json.JSONDecodeError, RecursionError) as error:
+        raise PlanningError(f"{path} holds no question for a path: {error}") from None
+    with errors_of(path):
+        asked: _Content = read_as(_Content, content, "a question for a path")
+    rover = rover_from_dict(asked.rover, str(path))
+    options = PathQueryOptions().change(**asdict(asked.options), joint_angles=asked.joint_angles)
+    question = SearchQuery(Site(rover, terrain, options), asked.start, asked.goal)
+    return question, asked.settings

@@ -59,7 +59,9 @@ def test_a_goal_off_the_map_has_a_way_to_the_frontier_if_that_is_wanted(planner)
 def friction_used(service):
     """Return the largest use of friction on a path."""
     service.given_path = GivenPath(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")
-    return float(service.snapshot().check_path().candidate.verdict.max_friction_utilisation)
+    return float(
+        service.given_path.judge(service.snapshot()).candidate.verdict.max_friction_utilisation
+    )
 
 
 @pytest.mark.parametrize(
@@ -144,19 +146,21 @@ def test_an_impossible_tolerance_and_a_payload_without_an_arm_are_refused():
 def test_the_measured_suspension_is_compared_with_the_predicted_one_where_the_rover_stands():
     service = make_service(make_terrain(waves))
     service.given_path = GivenPath(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]), "")
-    free = service.snapshot().check_path()
+    free = service.given_path.judge(service.snapshot())
     assert free.suspension is None and "suspension_mismatch" not in free.report
     prediction = free.candidate.prediction
     angles = [*prediction.rocker_angle[0], *prediction.bogie_angle[0]]
     predicted = dict(zip(SUSPENSION_JOINTS, angles, strict=True))
     assert abs(predicted["rocker_left"]) > 0.001
     service.take_joints(predicted)
-    assert service.snapshot().check_path().suspension is None  # where it stands is not known
+    assert (
+        service.given_path.judge(service.snapshot()).suspension is None
+    )  # where it stands is not known
     service.given_path = GivenPath(np.array([[0.5, 0.15, 0.3], [1.0, 0.3, 0.3]]), "")
     for bogie_left in (0.0, 0.2):
         service.take_joints({"bogie_left": predicted["bogie_left"] + bogie_left})
         service.take_pose(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.3]))
-        judgement = service.snapshot().check_path()
+        judgement = service.given_path.judge(service.snapshot())
         expected = dict.fromkeys(SUSPENSION_JOINTS, 0.0) | {"bogie_left": bogie_left}
         assert judgement.suspension.suspension_mismatch == pytest.approx(expected)
         assert judgement.traversable
@@ -168,7 +172,7 @@ def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     service.given_path = GivenPath(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")
 
     def find_loads():
-        return service.snapshot().check_path().candidate.prediction.wheel_loads
+        return service.given_path.judge(service.snapshot()).candidate.prediction.wheel_loads
 
     stowed, joints = find_loads(), service.settings.rover.manipulator.joints
     service.take_joints({joints[0]: 0.0})

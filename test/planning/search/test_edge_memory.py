@@ -10,8 +10,8 @@ from rover_physics.terrain.ground import pack_ground
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search import edge_memory
 from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.edges import Gear, Piece
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import Site
 from support.grounds import make_terrain, raised, rocky, waves
 from support.predictions import assert_same

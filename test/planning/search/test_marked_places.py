@@ -48,7 +48,7 @@ def service():
 def test_until_it_is_cleared_a_marked_place_refuses_paths_and_answers_lead_around_it(service):
     service.mark(PLACE)
     service.given_path = GivenPath(poses_at(np.linspace(0.0, 3.0, 40)), "")
-    judged = service.snapshot().check_path()
+    judged = service.given_path.judge(service.snapshot())
     assert judged.code == MARKED_CODE
     assert PLACE.reason in judged.reason and PLACE.date in judged.reason
     rim = judged.candidate.poses[judged.candidate.verdict.first_failure]
