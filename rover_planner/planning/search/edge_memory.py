@@ -16,16 +16,13 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.layers import find_changes, have_same_layers
 from rover_planner.planning.search.edges import Edges, Piece, make_primitives
+from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.query import SearchQuery, Site
 
 MARGIN = BLOCK + 1
 """Distance from wheels and body within which ground counts for a pose [cells]: the kernels look at
 the blocks of cells that these touch, however they are turned, and at the cells around them."""
-
-PosesByModel = tuple[KnownPoses, KnownPoses]
-"""What is known of poses of whole paths, and of the pieces that a search asks about in numbers,
-with other options if the chance of failure counts."""
 
 
 class EdgeMemory:
@@ -37,38 +34,38 @@ class EdgeMemory:
     """
 
     def __init__(self) -> None:
-        self._site: Site | None = None
+        self._judge: PathJudge | None = None
+        """The model at the site of the last search."""
         self._edges: Edges | None = None
-        self._poses: PosesByModel | None = None
         self._query: SearchQuery | None = None
         self._pieces: list[Piece] = []
 
-    def begin(self, site: Site) -> PosesByModel:
+    def begin(self, site: Site) -> PathJudge:
         """Forget what does not hold at the site of the next search.
 
-        Returns what is known of poses of whole paths, and of pieces; what is added is kept.
+        Returns the model there, with what is known of poses; what it finds is kept.
         """
-        before, self._site = self._site, None  # if forgetting fails, nothing holds
-        if self._poses is None or before is None or not _is_alike(before, site):
+        before, self._judge = self._judge, None  # if forgetting fails, nothing holds
+        if before is None or not _is_alike(before.site, site):
             of_pieces, is_same = KnownPoses(), site.options.asked_chance is None
-            self._poses = KnownPoses(others=of_pieces if is_same else None), of_pieces
+            judge = PathJudge(site, KnownPoses(others=of_pieces if is_same else None), of_pieces)
             self._edges = None
             self._forget_costs(lambda places: np.ones(len(places), bool))
         else:
-            changed = _find_changed(before, site)
+            judge, changed = replace(before, site=site), _find_changed(before.site, site)
             if changed.any():
-                self._forget_near(changed, site, self._poses)
-        self._site = site
-        return self._poses
+                self._forget_near(changed, judge)
+        self._judge = judge
+        return judge
 
-    def _forget_near(
-        self, changed: NDArray[np.bool_], site: Site, known_poses: PosesByModel
-    ) -> None:
+    def _forget_near(self, changed: NDArray[np.bool_], judge: PathJudge) -> None:
         """Forget what the cells (ny, nx) of the map that have changed may touch."""
+        site = judge.site
         reach = find_reach(site.rover) + MARGIN * site.terrain.resolution
         are_near = _look_near(changed, site.terrain, reach)
-        for known in known_poses:
-            known.forget(are_near)
+        for known in (judge.known, judge.known_in_pieces):
+            if known is not None:
+                known.forget(are_near)
         self._forget_costs(are_near)
         if self._edges is not None:
             longest = max(one.length for own in self._edges.primitives for one in own)

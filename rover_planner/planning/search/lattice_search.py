@@ -87,6 +87,8 @@ class _Ends:
         self.connections = connections
         self.nodes = np.array([one.node for one in connections], np.int64)
         self.costs = np.array([one.cost + one.surcharge for one in connections])
+        self.seeds = Seeds(self.nodes, self.costs)
+        """The nodes with their costs."""
         self.judged = np.zeros(len(connections), bool)
         self.codes: list[str] = []
         """Codes of the connections that were refused."""
@@ -110,11 +112,6 @@ class _Ends:
     def open_nodes(self) -> NDArray[np.int64]:
         """The nodes (k,) of the connections that may pass."""
         return self.nodes[np.isfinite(self.costs)]
-
-    @property
-    def seeds(self) -> Seeds:
-        """The nodes with their costs."""
-        return Seeds(self.nodes, self.costs)
 
 
 Part = tuple[Edges | _Ends, int]
@@ -257,14 +254,14 @@ class LatticeSearch:
         found = self.judge.judge_pieces([kept.piece(index) for kept, index in parts])
         for (kept, index), judged in zip(parts, found, strict=True):
             kept.write(index, judged.code, judged.cost)
-            if kept is self.edges:
-                self.progress.judged += 1
-                self._note(index)
+            self.progress.judged += kept is self.edges
+        self._note(parts)
         return not any(judged.code for judged in found)
 
-    def _note(self, edge: int) -> None:
-        """Note that the cost of an edge has changed."""
-        self.shortest.note(self.edges.ends(np.array([edge])))
+    def _note(self, parts: Sequence[Part]) -> None:
+        """Note that the costs of parts have changed."""
+        edges = [index for kept, index in parts if kept is self.edges]
+        self.shortest.note(self.edges.ends(np.array(edges, np.int64)))
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""
@@ -281,13 +278,11 @@ class LatticeSearch:
 
     def _refuse(self, route: Route, number: int, code: str) -> None:
         """Close a part of a route for this search: it passes, but the whole path does not."""
-        kept, index = self._parts(route)[number]
+        kept, index = part = self._parts(route)[number]
         if isinstance(kept, Edges):
             self._refused.append((index, float(kept.cost.flat[index])))
-            kept.write(index, code, np.inf)
-            self._note(index)
-        else:
-            kept.write(index, code, np.inf)
+        kept.write(index, code, np.inf)
+        self._note([part])
 
 
 def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

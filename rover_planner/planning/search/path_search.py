@@ -151,6 +151,11 @@ def find_path(
 ) -> SearchResult:
     """Search a path from start to goal.
 
+    If chances are weighed, it is the path with the least cost + weight x chance of several: the
+    first is the cheapest one whose chance is accepted, each further one the cheapest with at most
+    half the chance of that before. What is uncertain is mostly common to a path, so that its
+    chance is that of its worst place and does not add up from edge to edge.
+
     Args:
         query: What is asked.
         settings: How it is searched.
@@ -162,24 +167,9 @@ def find_path(
         RoverError: The model refuses an option.
     """
     settings = settings or LatticeSettings()
-    if settings.chance_weight > 0.0 and not settings.ends_at_first:
-        return _weigh_chances(query, settings, memory, on_progress)
-    return _PathFinder(query, settings, memory, on_progress).answer()
-
-
-def _weigh_chances(
-    query: SearchQuery,
-    settings: LatticeSettings,
-    memory: EdgeMemory | None,
-    on_progress: Callable[[SearchProgress], None] | None,
-) -> SearchResult:
-    """Return the path with the least cost + weight x chance of several.
-
-    The first is the cheapest one whose chance is accepted, each further one the cheapest with at
-    most half the chance of that before. What is uncertain is mostly common to a path, so that its
-    chance is that of its worst place and does not add up from edge to edge.
-    """
     began, weight = time.perf_counter(), settings.chance_weight
+    if weight == 0.0 or settings.ends_at_first:
+        return _PathFinder(query, settings, memory, on_progress).answer()
     accepted = min(query.site.options.accepted_chance, ASKED)
     answers, totals, earlier = [], [], None
     while True:
@@ -227,7 +217,7 @@ class _PathFinder:
         ground = None if settings.frontier else query.site.terrain
         self._goal = _check_end("goal", query.goal, ground)
         self._memory = memory or EdgeMemory()
-        self._judge = PathJudge(query.site, *self._memory.begin(query.site))
+        self._judge = self._memory.begin(query.site)
         cell = settings.cell or 0.25 * query.site.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
         self._repeatable = True
