@@ -13,7 +13,7 @@ from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
-    from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
+    from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 Out = Annotated[Path, argument("OUT", "The path with its predictions, .npz; written if found.")]
 Picture = Annotated[Path | None, picture_option("Draw the answer on the map (.png, .svg).")]
@@ -60,7 +60,12 @@ def plan(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.planning.path_query import PathQueryOptions
-    from rover_planner.planning.search.query import LatticeSettings, SearchQuery, write_query
+    from rover_planner.planning.search.query import (
+        LatticeSettings,
+        SearchQuery,
+        Site,
+        write_query,
+    )
 
     shared.keep_inputs((rover, terrain), out, dump, picture)
     settings = LatticeSettings(
