@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.limits.table import CHANCE, TRAPPED, Sense
-from rover_physics.names import SERVO, WHEEL_POSITIONS
+from rover_physics.names import SERVO
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
@@ -148,11 +148,6 @@ class JudgedCase:
     def distance(self) -> Floats:
         """(n,) distance along the path [m]."""
         return distance_along(self.case.poses)
-
-    def loads_of_axles(self, waypoint: int) -> dict[str, float]:
-        """Return the load [N] of each axle at a waypoint by its name; NaN where unknown."""
-        loads = self.prediction.wheel_loads[waypoint]
-        return {name: float(loads[k] + loads[k + 3]) for k, name in enumerate(WHEEL_POSITIONS)}
 
     @property
     def place(self) -> int:

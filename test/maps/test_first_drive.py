@@ -39,8 +39,8 @@ class Drive:
         """Give the server the map that the camera sees now."""
         state = self.simulation.plant.state()
         attitude = rpy_from_xyzw(tuple(state.orientation.tolist()))
-        suspension = {name: state.joint_positions[name] for name in SUSPENSION_JOINTS}
-        standing = Standing(*state.position.tolist(), *attitude, suspension)
+        suspension = np.array([state.joint_positions[name] for name in SUSPENSION_JOINTS])
+        standing = Standing(np.array([*state.position, *attitude]), suspension)
         seen = self.simulation.look(state.position, attitude[2])
         now = self.keeper.take(seen, "elevation_cloud", self.time, standing)
         self.service.take_terrain(now.terrain, "elevation_cloud", None, now.sources)

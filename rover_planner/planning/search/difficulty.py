@@ -18,6 +18,7 @@ from scipy import ndimage
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import exact_kernel
+from rover_physics.rover.linkage import pack_linkage
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
@@ -247,8 +248,7 @@ def find_groundless(rover: Rover, terrain: Terrain, nodes: Nodes) -> NDArray[np.
 
 def wheel_places(rover: Rover) -> NDArray[np.float64]:
     """Return (HEADINGS, 6, 2) x, y [m] of the wheel centres at a node at the origin, level."""
-    own = np.array([place[:2] for place in rover.suspension.wheels.values()])
-    places = np.concatenate([own, own * (1.0, -1.0)])
+    places = pack_linkage(rover).wheels
     c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
     x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
     return np.stack([x, y], axis=-1)
