@@ -116,7 +116,9 @@ class Patch:
 def empty_patch(box: CellBox, names: tuple[str, ...] = ALWAYS) -> Patch:
     """Return a patch without known cells."""
     shape = box.rows, box.columns
-    layers = {name: np.full(shape, LAYERS[name].unknown, LAYERS[name].kind) for name in names}
+    layers: dict[str, Layer] = {
+        name: np.full(shape, LAYERS[name].unknown, LAYERS[name].kind) for name in names
+    }
     return Patch(box, layers)
 
 
