@@ -99,9 +99,9 @@ def test_no_rover_of_extreme_numbers_passes_without_numbers(places, number, sign
 @pytest.mark.parametrize(
     ("place", "number", "right"),
     [
-        (("masses", "body", "mass"), 1.7e308, r"masses.body.mass is 1.7e\+308; .* to 1e\+09"),
-        (("gravity",), 1e-310, "gravity is 1e-310; it must be from 1e-06 to 1000"),
-        (("wheel", "radius"), -1e200, "wheel.radius is -1e.200; it must be from 0.001"),
+        (("masses", "body", "mass"), 1.7e308, r"masses.body.mass is 1.7e\+308; .* at most 1e\+09"),
+        (("gravity",), 1e-310, "gravity is 1e-310; it must be .* at least 1e-06 and"),
+        (("wheel", "radius"), -1e200, "wheel.radius is -1e.200; it must .* least 0.001"),
         (("wheel", "width"), math.nan, "wheel.width is nan"),
     ],
 )
