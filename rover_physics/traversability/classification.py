@@ -24,8 +24,12 @@ PASSABLE = "passable"
 WITH_SPEED_SERVOS = "passable with speed servos"
 WITH_TRACTION_CONTROL = "passable with traction control"
 IMPASSABLE = "impassable"
-TRAVERSABILITY_CLASSES = (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IMPASSABLE)
-"""The classes, from best to worst: by the first of TORQUE_POLICIES that passes, or none."""
+OF_POLICY = dict(
+    zip(TORQUE_POLICIES, (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL), strict=True)
+)
+"""The class of what passes first under a policy."""
+TRAVERSABILITY_CLASSES = (*OF_POLICY.values(), IMPASSABLE)
+"""The classes, from best to worst."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +211,7 @@ def _decision(
 ) -> ClassifiedWaypoint:
     """Return what decides a waypoint under one policy."""
     name = WHEELS[wheel] if wheel >= 0 else ""
-    found = IMPASSABLE if reason else TRAVERSABILITY_CLASSES[TORQUE_POLICIES.index(policy)]
+    found = IMPASSABLE if reason else OF_POLICY[policy]
     return ClassifiedWaypoint(found, policy, code, name, margin, reason)
 
 

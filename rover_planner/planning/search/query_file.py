@@ -2,7 +2,7 @@
 """Files that hold a query for a path with its map, so that it can be asked again elsewhere."""
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import open_npz
 from rover_physics.files.validation import errors_of, read_as
-from rover_physics.rover.rover_file import rover_from_dict
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
@@ -23,31 +23,13 @@ _ENTRY, _MOST = "way_question", 1_000_000
 
 
 @dataclass(frozen=True)
-class _Options:
-    """`PathQueryOptions` as the entry holds them, with the options of the model beside them."""
-
-    count: int
-    spacing: float
-    waypoint_spacing: float
-    policy: str
-    control_margin: float
-    friction: float | None
-    max_torque: float | None
-    soil: str | None
-    payload: float | None
-    map_sigmas: float
-    accepted_chance: float = 1.0
-
-
-@dataclass(frozen=True)
 class _Content:
     """Content of the entry: a question for a path and the settings of its search."""
 
     rover: dict[str, Any]
     start: tuple[float, float, float]
     goal: tuple[float, float, float]
-    options: _Options
-    joint_angles: dict[str, float] | None
+    options: PathQueryOptions
     settings: LatticeSettings
 
 
@@ -58,15 +40,12 @@ def write_query(path: Path, question: SearchQuery, settings: LatticeSettings) ->
         TerrainError: The file cannot be written.
     """
     site = question.site
-    options = asdict(site.options)
-    options |= options.pop("model")
     text = json.dumps(
         {
-            "rover": asdict(site.rover),
+            "rover": rover_to_dict(site.rover),
             "start": np.asarray(question.start).tolist(),
             "goal": np.asarray(question.goal).tolist(),
-            "options": {field.name: options[field.name] for field in fields(_Options)},
-            "joint_angles": site.options.model.arm_angles,
+            "options": asdict(site.options),
             "settings": asdict(settings),
         }
     )
@@ -94,6 +73,5 @@ def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, Lat
     with errors_of(path):
         asked: _Content = read_as(_Content, content, "a question for a path")
     rover = rover_from_dict(asked.rover, str(path))
-    options = PathQueryOptions().change(**asdict(asked.options), joint_angles=asked.joint_angles)
-    question = SearchQuery(Site(rover, terrain, options), asked.start, asked.goal)
+    question = SearchQuery(Site(rover, terrain, asked.options), asked.start, asked.goal)
     return question, asked.settings
