@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.bounds.path import SIGMAS, is_uncertain
+from rover_physics.bounds.path import is_uncertain
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.names import CONTROL_POLICIES, EQUAL, TORQUE_POLICIES, WHEELS
 from rover_physics.numerics.interruption import check_interruption
@@ -16,6 +16,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import SIGMAS
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_poses
 from rover_physics.traversability.verdict import Verdict, explain_rows

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.limits.table import CHANCE, TRAPPED, Sense
-from rover_physics.names import SERVO, WHEEL_POSITIONS
+from rover_physics.names import SERVO
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
@@ -23,8 +23,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.path_search import find_path
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
@@ -149,11 +148,6 @@ class JudgedCase:
     def distance(self) -> Floats:
         """(n,) distance along the path [m]."""
         return distance_along(self.case.poses)
-
-    def loads_of_axles(self, waypoint: int) -> dict[str, float]:
-        """Return the load [N] of each axle at a waypoint by its name; NaN where unknown."""
-        loads = self.prediction.wheel_loads[waypoint]
-        return {name: float(loads[k] + loads[k + 3]) for k, name in enumerate(WHEEL_POSITIONS)}
 
     @property
     def place(self) -> int:

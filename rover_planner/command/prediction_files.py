@@ -24,7 +24,7 @@ from rover_physics.traversability.judge import PartwiseJudge, judge_path, judge_
 from rover_physics.traversability.torque_ranges import TorqueRanges, find_torque_ranges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import (
+from rover_planner.planning.path_query import (
     Assumptions,
     assume,
     read_assumptions,

@@ -14,7 +14,7 @@ from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, Budget
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
-from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
+from rover_planner.planning.answering.questions import Asked, QuestionQueue
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import LATCHED_QOS

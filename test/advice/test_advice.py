@@ -22,7 +22,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from support.grounds import enlarged, make_terrain, rock_left
 from support.rovers import FIXED, LSR1, M2020, similar
 

@@ -20,9 +20,13 @@ from rover_physics.limits.table import NEWTONS, Limit
 from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.traversability.pose_classes import IMPASSABLE, RoverOnMap, classify_poses
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.query_file import read_query, write_query
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import (
+    LatticeSettings,
+    SearchQuery,
+    Site,
+    read_query,
+    write_query,
+)
 from rover_planner.studies.rover_values import find_key
 from rover_planner.survey.layers import NO_LIMIT, number_limits
 from rover_planner.survey.request import SurveyRequest
