@@ -17,7 +17,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
-from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_geometry import distance_along
@@ -83,7 +82,7 @@ class Case:
             accepted_chance=self.site.options.accepted_chance,  # 1, too: the chance is told
         )
         path = self.site.refuse_ground(Candidate(self.poses, *judged))
-        return JudgedCase(self, path.prediction, path.verdict)
+        return JudgedCase(**vars(path), case=self)
 
 
 def case_of(site: Site, poses: Floats) -> Case:
@@ -95,15 +94,11 @@ def case_of(site: Site, poses: Floats) -> Case:
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedCase:
-    """A case with its prediction and verdict; where it is refused, where and by what it fails."""
+class JudgedCase(Candidate):
+    """The path of a case as it was judged; where it is refused, where and by what it fails."""
 
     case: Case
     """The case."""
-    prediction: PathPrediction
-    """The prediction, perhaps only up to the first failure."""
-    verdict: Verdict
-    """The verdict."""
 
     @property
     def passes(self) -> bool:
