@@ -112,10 +112,10 @@ EXTREMES = {
 }
 """Fields of a verdict that are the extreme of a quantity, as their names say: the quantity, and
 which of two values is worse."""
+WORSE = dict(EXTREMES.values())
+"""The same by the quantity."""
 BOUND_EXTREMES = {
-    f"{quantity}_bound": worse
-    for quantity, worse in EXTREMES.values()
-    if f"{quantity}_bound" in _FIELDS
+    name: WORSE[name.removesuffix("_bound")] for name in _FIELDS if name.endswith("_bound")
 }
 """Fields that are the worst case on an uncertain map, and which of two values is worse."""
 

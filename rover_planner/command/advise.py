@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE, SIGMAS
 from rover_planner.command import shared
 from rover_planner.command.shared import argument, option, picture_option, read_arm_angles
 
@@ -29,7 +29,7 @@ def advise(
     soil: shared.SoilName = None,
     arm: shared.ArmAngles = None,
     payload: shared.Payload = None,
-    sigmas: shared.Sigmas = 3.0,
+    sigmas: shared.Sigmas = SIGMAS,
     accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     budget: Annotated[float, option("S", "Time for the advice in s.", min=0.01)] = 10.0,
     picture: Annotated[

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE, SIGMAS
 from rover_planner.command import shared
 from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.poses import GOAL, START, Pose
@@ -41,7 +41,7 @@ def plan(
         bool,
         flag("--frontier", "Plan as near as possible to a goal on unknown ground or off the map."),
     ] = False,
-    sigmas: shared.Sigmas = 3.0,
+    sigmas: shared.Sigmas = SIGMAS,
     accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     chance_weight: Annotated[
         float, option("M", "Length in m that a path may be longer to fail never, not always.")

@@ -3,7 +3,7 @@
 
 import json
 import math
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.npz_file import open_npz
 from rover_physics.files.validation import errors_of, read_as
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import rover_from_dict
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
@@ -156,31 +156,13 @@ def cut_out(site: Site, nodes: Nodes) -> Terrain:
 
 
 @dataclass(frozen=True)
-class _Options:
-    """`PathQueryOptions` as the entry holds them, with the options of the model beside them."""
-
-    count: int
-    spacing: float
-    waypoint_spacing: float
-    policy: str
-    control_margin: float
-    friction: float | None
-    max_torque: float | None
-    soil: str | None
-    payload: float | None
-    map_sigmas: float
-    accepted_chance: float = 1.0
-
-
-@dataclass(frozen=True)
 class _Content:
     """Content of the entry: a question for a path and the settings of its search."""
 
     rover: dict[str, Any]
     start: tuple[float, float, float]
     goal: tuple[float, float, float]
-    options: _Options
-    joint_angles: dict[str, float] | None
+    options: PathQueryOptions
     settings: LatticeSettings
 
 
@@ -191,15 +173,12 @@ def write_query(path: Path, question: SearchQuery, settings: LatticeSettings) ->
         TerrainError: The file cannot be written.
     """
     site = question.site
-    options = asdict(site.options)
-    options |= options.pop("model")
     text = json.dumps(
         {
-            "rover": asdict(site.rover),
+            "rover": rover_to_dict(site.rover),
             "start": np.asarray(question.start).tolist(),
             "goal": np.asarray(question.goal).tolist(),
-            "options": {field.name: options[field.name] for field in fields(_Options)},
-            "joint_angles": site.options.model.arm_angles,
+            "options": asdict(site.options),
             "settings": asdict(settings),
         }
     )
@@ -227,6 +206,5 @@ def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, Lat
     with errors_of(path):
         asked: _Content = read_as(_Content, content, "a question for a path")
     rover = rover_from_dict(asked.rover, str(path))
-    options = PathQueryOptions().change(**asdict(asked.options), joint_angles=asked.joint_angles)
-    question = SearchQuery(Site(rover, terrain, options), asked.start, asked.goal)
+    question = SearchQuery(Site(rover, terrain, asked.options), asked.start, asked.goal)
     return question, asked.settings
