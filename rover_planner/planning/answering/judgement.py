@@ -124,22 +124,16 @@ class PathJudgement:
         If there is no time for the waypoints beyond the first failure, or for classes, the
         judgement is without them.
         """
-        whole = self
+        whole, candidate, site = self, self.candidate, self.site
         try:
-            whole = self._with_rest()
+            if candidate and site and not (candidate.is_complete or self.is_brief):
+                whole = replace(self, candidate=PathJudge(site).check(candidate.poses))
             if not whole._is_equal_and_traversable:
                 _ = whole.classes
             _ = whole.ground
         except QuestionStoppedError:
             return replace(whole, is_brief=True)
         return whole
-
-    def _with_rest(self) -> "PathJudgement":
-        """Return the judgement with the waypoints beyond the first failure."""
-        candidate, site = self.candidate, self.site
-        if candidate is None or site is None or candidate.is_complete or self.is_brief:
-            return self
-        return replace(self, candidate=PathJudge(site).check(candidate.poses))
 
     @property
     def _is_equal_and_traversable(self) -> bool:
@@ -153,7 +147,7 @@ class PathJudgement:
 
         Computed on first use, with the classes and the rest.
         """
-        whole = self._with_rest()
+        whole = self.complete()
         entries: dict[str, Any] = {
             "traversable": self.traversable,
             "code": self.code,
