@@ -41,10 +41,11 @@ def advise(
 
     Exit code 0: it ran, with any answer. 2: bad input.
     """
+    from rover_physics.numerics.interruption import interruptible
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
-    from rover_planner.advice.advise import STOPPED, grow_within, path_of, refuse
+    from rover_planner.advice.advise import STOPPED, grow_advice, path_of, refuse
     from rover_planner.advice.case import Case
     from rover_planner.command.prediction_files import read_poses
     from rover_planner.nodes.warm_up import prepare_search
@@ -75,8 +76,9 @@ def advise(
         with show_progress() as progress:
             progress("load the model (the first run compiles it)")
             prepare_search(site)
-            for advice in grow_within(case, Budget(budget).check):
-                progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
+            with interruptible(Budget(budget).check):
+                for advice in grow_advice(case):
+                    progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
     except KeyboardInterrupt:
         if advice is None or not advice.found:
             typer.echo(STOPPED, err=True)
