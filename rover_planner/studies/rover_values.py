@@ -51,7 +51,7 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
 
     def amount(label: str, unit: str, *key: str | int, top: float = 0.0) -> RoverValue:
         now = get_value(data, key)
-        return _make_value((key,), f"{label} [{unit}]", now, 0.2 * now, max(2.5 * now, top))
+        return _make_value((key,), f"{label} [{unit}]", now, 0.2 * now, max(2.5 * now, top) or 1.0)
 
     height = length("wheels z", "suspension", "wheels", "rear", 2, within=1.5 * radius)
     all_wheels = tuple(("suspension", "wheels", name, 2) for name in WHEEL_POSITIONS)

@@ -25,6 +25,7 @@ from rover_physics.prediction.map_sweep import score
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
+from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from rover_planner.planning.path_query import Candidate
@@ -34,10 +35,7 @@ from support.rovers import LSR1
 
 POSES = poses_at(np.linspace(-0.2, 0.2, 5))
 LEVEL = plane(0.0, 0.0)
-DECISIVE = (
-    "roll", "pitch", "rocker_angle", "bogie_angle", "wheel_loads", "friction_utilisation",
-    "torque_saturation", "tip_over_ratio",
-)  # fmt: skip
+DECISIVE = [name for name in BOUNDED_VALUES if name != "belly_clearance"]
 EXTREMES = (
     0.0, 5e-324, 1e-310, 1e-300, 1e-155, 1e-20, 1e-9, 1e-6, 1e-3, 0.1, 10.0, 1e3, 1e6, 1e9, 1e20,
     1e154, 1e155, 1e300, 1.7e308, math.inf, math.nan,
