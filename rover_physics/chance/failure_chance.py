@@ -2,12 +2,13 @@
 """The chance that a path fails: the share of a fixed set of samples in which it breaks a limit.
 
 Poses that use less than FAR of every limit keep them in all samples, on uneven ground, where a
-place a little aside has other contacts, those that use less than UNEVEN_FAR. So do those of which
-none around uses more than NEAR with the least friction and torque of all samples, and all else off
-to either side. The others are evaluated anew in each sample, with the contacts that they have at
-its place: samples that share a place settle once. Drops and poses between waypoints are those of
-the prediction. On even ground a share of the model's error counts. Where a sample would leave
-the known ground, the pose stays at its place: what nobody knows is no failure.
+place a little aside has other contacts, those that use less than UNEVEN_FAR; what stands beside
+them is looked for by some of them, ASIDE apart. So do those of which none around uses more than
+NEAR with the least friction and torque of all samples, and all else off to either side. The others
+are evaluated anew in each sample, with the contacts that they have at its place: samples that share
+a place settle once. Drops and poses between waypoints are those of the prediction. On even ground a
+share of the model's error counts. Where a sample would leave the known ground, the pose stays at
+its place: what nobody knows is no failure.
 """
 
 from dataclasses import dataclass, replace
@@ -50,6 +51,9 @@ torque of a sample may be less than half."""
 UNEVEN_FAR, AROUND = 0.25, 5.0
 """What FAR is where ground is uneven, and the distance along the path over which poses are around
 each other [standard deviations of the position]."""
+ASIDE = 0.5
+"""Distance of the poses far from all limits that look aside [wheel radii]: what a wheel would roll
+over is wider than that."""
 NEAR = 0.95
 """Use with the least friction and torque of all samples below which no sample breaks a limit."""
 EVEN, EVEN_SHARE = 0.1, 0.3
@@ -169,23 +173,40 @@ def _find_asked(
     worst_two, n = worst_of(groups), len(swept.prediction.poses)
     weakest = worst_two[0].samples[0]
     far = min(FAR, NEAR * min(weakest.friction[0], weakest.torque))
+    settled = rows.results["status"] == PoseStatus.SETTLED
     is_even = _unevenness(rows.results) < EVEN
     near = _find_near(model, swept, rows.results, on_path, far)
     near |= ~is_even & _find_near(model, swept, rows.results, on_path, min(far, UNEVEN_FAR))
-    near &= rows.results["status"] == PoseStatus.SETTLED
-    if not near.any() or model.terrain.elevation_std is not None:
+    near &= settled
+    aside = np.zeros(len(near), bool)
+    if worst_two[0].shift.any():
+        spacing = ASIDE * model.rover.wheel.radius if around else 0.0
+        aside[:n] = settled[:n] & ~near[:n] & _spread(swept.prediction.distance, spacing)
+    is_exact = model.terrain.elevation_std is None
+    tried = np.flatnonzero(aside | near & is_exact)
+    if not len(tried):
         return np.flatnonzero(near), on_path
     closer = _find_near(model, swept, rows.results, on_path, NEAR)
-    by_path, asked = _needs_path(model, rows.results), np.flatnonzero(near)
+    by_path = _needs_path(model, rows.results)
     for group in worst_two:
-        found = _evaluate(model, rows, asked, n, group)[0]
-        worst = _place(rows, asked, found)
+        found = _evaluate(model, rows, tried, n, group)[0]
+        worst = _place(rows, tried, found)
         if on_path:
             _write_path(model, swept, worst)
         closer |= _find_near(model, swept, worst, on_path, NEAR)
         by_path |= _needs_path(model, worst)
-    closer[:n] |= _widen(closer[:n], swept.prediction.distance, around)
-    return np.flatnonzero(near & closer), on_path and by_path
+    beside = closer & aside
+    for marked in (closer, beside):
+        marked[:n] |= _widen(marked[:n], swept.prediction.distance, around)
+    asked = near & closer if is_exact else near
+    return np.flatnonzero(asked | beside & settled), on_path and (by_path or not is_exact)
+
+
+def _spread(distance: Floats, spacing: float) -> NDArray[np.bool_]:
+    """Return waypoints (n,) a spacing [m] apart along the path; all of them for 0."""
+    if spacing == 0.0:
+        return np.ones(len(distance), bool)
+    return np.asarray(np.diff(distance // spacing, prepend=-1.0) > 0.0)
 
 
 def _widen(marked: NDArray[np.bool_], distance: Floats, around: float) -> NDArray[np.bool_]:
