@@ -115,6 +115,7 @@ def write_servo_forces(model, work, result):
         strength += largest
         saturation += result.torque_saturation[wheel]
         power += max(torque * servo.rim_speed[wheel] * settings.speed / linkage.radius, 0.0)
+        _stand_upright(work.contacts.lean[wheel], wheel, result)
     result.power = power
     result.speed_share = servo.speed_share
     result.stalls = servo.stall
@@ -124,6 +125,15 @@ def write_servo_forces(model, work, result):
     for k in range(MOTIONS):
         result.deviation[k] = servo.deviation[k]
     result.deviation[2] /= TURN_DISTANCE * linkage.radius
+
+
+@kernel
+def _stand_upright(lean, wheel, result):
+    """Write load and lateral force of a wheel along its radius and axle, whatever the lean."""
+    N, S = result.wheel_loads[wheel], result.lateral[wheel]
+    upright = 1.0 / np.sqrt(1.0 + lean * lean)
+    result.wheel_loads[wheel] = upright * (N - lean * S)
+    result.lateral[wheel] = upright * (S + lean * N)
 
 
 @kernel
