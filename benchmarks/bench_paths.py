@@ -29,7 +29,7 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command.prediction_files import read_poses, write_prediction
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.grounds import bouldered, make_terrain, waves
 

@@ -21,7 +21,7 @@ from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cl
 from rover_physics import Terrain, load_rover
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)

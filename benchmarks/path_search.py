@@ -22,8 +22,7 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import FOUND, OUT_OF_TIME, SearchResult, find_path
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]

@@ -14,7 +14,7 @@ from rover_physics import Terrain, load_rover, load_terrain
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.figures.path_pictures import draw_advice
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 rover = load_rover("lsr1")

@@ -33,13 +33,10 @@ from msg_adapters.gridding import (
 from rover_physics.numerics.plausible import MAX_RESOLUTION, MIN_RESOLUTION
 from rover_physics.numerics.quiet import quiet
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.layers import GRID_LAYERS
 
-CLASS = "class"
-"""Field with classes of ground, of any datatype."""
-LAYERS = {"friction": "friction", "elevation_std": "elevation_std", CLASS: "ground_class"}
+LAYERS = {layer.field: name for name, layer in GRID_LAYERS.items() if layer.field}
 """Fields of a cloud besides x, y and z, and the layers of the terrain that they become."""
-COMBINED = {"friction": "min", "elevation_std": "max", CLASS: "most frequent"}
-"""How the values of several points of a cell are combined."""
 
 MAX_POINT_STEP = 1_000_000
 """Largest size of a point [bytes]."""
@@ -144,7 +141,7 @@ def _terrain_of_scatter(
     if "friction" in columns:
         columns["friction"][~np.isfinite(columns["friction"])] = np.nan
     layers = {
-        layer: combine(cells, columns[name][known], grid, COMBINED[name])
+        layer: combine(cells, columns[name][known], grid, GRID_LAYERS[layer].combined)
         for name, layer in LAYERS.items()
         if name in columns
     }
@@ -254,7 +251,7 @@ def _check_layout(cloud: PointCloud2) -> int:
 def _field_format(field: PointField, cloud: PointCloud2) -> str:
     """Return the numpy format of a field in its byte order."""
     kinds, must = _FLOATS, "FLOAT32 or FLOAT64, in metres"
-    if field.name == CLASS:
+    if field.name in LAYERS and GRID_LAYERS[LAYERS[field.name]].is_class:
         kinds, must = _NUMBERS, f"one of {', '.join(_DATATYPE_NAMES.values())}"
     if field.datatype not in kinds:
         datatype = _DATATYPE_NAMES.get(field.datatype, str(field.datatype))

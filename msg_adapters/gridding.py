@@ -17,6 +17,7 @@ from msg_adapters.errors import MessageError
 from rover_physics.numerics.arrays import seal_array
 from rover_physics.numerics.plausible import MAX_COORDINATE, MIN_RESOLUTION
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.layers import GRID_LAYERS, MOST_FREQUENT
 
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
@@ -243,7 +244,7 @@ def combine(cells, values, grid: CloudGrid, how: str) -> NDArray[np.float64]:
     elif how == "median":
         some = np.flatnonzero(np.bincount(cells, minlength=size))
         combined[some] = ndimage.median(values, cells, some)
-    elif how == "most frequent":
+    elif how == MOST_FREQUENT:
         combined = most_frequent(cells, values, size)
     else:
         counts = np.bincount(cells, minlength=size)
@@ -295,7 +296,7 @@ def make_terrain(
     unknown = ~np.isfinite(elevation)
     elevation[unknown] = np.nan
     for name, layer in layers.items():
-        if name == "ground_class":
+        if GRID_LAYERS[name].is_class:
             layer[~np.isfinite(layer) | (layer < 0.0)] = np.nan
         else:
             layer[unknown] = np.nan

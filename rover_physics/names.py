@@ -33,6 +33,6 @@ wheels. Their angles are positive to the left."""
 EQUAL, SERVO, OPTIMAL = "equal", "servo", "optimal"
 TORQUE_POLICIES = (EQUAL, SERVO, OPTIMAL)
 """Torque policies: equal torques on all wheels; the torques of speed servos; the torques that need
-the least friction."""
+the least friction. In this order traversability classes ask for them."""
 CONTROL_POLICIES = (EQUAL, OPTIMAL)
 """Torque policies of the traction controller, which commands torques."""

@@ -41,14 +41,14 @@ class BoundStatus(IntEnum):
 
 
 class TorquePolicy(IntEnum):
-    """Distribution of the traction among the wheels."""
+    """Distribution of the traction among the wheels, numbered as in `names.TORQUE_POLICIES`."""
 
     EQUAL = 0
     """Equal traction on all wheels."""
-    OPTIMAL = 1
-    """The torques that need the least friction, as traction control can apply them."""
-    SERVO = 2
+    SERVO = 1
     """Torques of speed servos at the rate of the commanded motion."""
+    OPTIMAL = 2
+    """The torques that need the least friction, as traction control can apply them."""
 
 
 class Stall(IntEnum):

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client of the traverse server for tests: publishes, calls, and keeps the results."""
 
+import gc
 import time
 from functools import cache, partial
+from weakref import WeakSet
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -35,6 +37,7 @@ START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)
 """Default poses of a query: x, y [m] and yaw [rad]."""
 load_kernels = cache(warm_up)
 """Loads the kernels of questions, once in a process."""
+_servers: WeakSet[TraverseServer] = WeakSet()
 
 
 def spin_server(ros: RosRun, **overrides) -> TraverseServer:
@@ -45,11 +48,15 @@ def spin_server(ros: RosRun, **overrides) -> TraverseServer:
     farther apart, so that a question takes less work.
     """
     load_kernels()
+    if _servers:
+        gc.collect()  # one that is collected later would end the log of this one
     values = {"time_budget": 60.0, "map_folder": "/", "waypoint_spacing": 0.05} | overrides
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "LOADING_DELAY", 1e6)
         patch.setattr(traverse_server, "EXACT", ())
-        return ros.start(TraverseServer, **values)
+        server = ros.start(TraverseServer, **values)
+    _servers.add(server)
+    return server
 
 
 class PlannerClient(Node):

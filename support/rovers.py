@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from rover_physics import load_rover
-from rover_physics.files.validation import Key, find_unit
+from rover_physics.files.validation import Key, find_rule
 from rover_physics.rover.model import Rover, Steering
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 
@@ -37,7 +37,7 @@ def similar(rover: Rover, size: float, mass: float = 0.0, gravity: float = 1.0) 
         if isinstance(values, list):
             return [scale(one, (*key, k)) for k, one in enumerate(values)]
         is_number = isinstance(values, float)
-        return values * factors.get(find_unit(Rover, key), 1.0) if is_number else values
+        return values * factors.get(find_rule(Rover, key).unit, 1.0) if is_number else values
 
     return rover_from_dict(scale(rover_to_dict(rover)), rover.name)
 

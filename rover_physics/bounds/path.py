@@ -48,8 +48,6 @@ from rover_physics.status import BoundStatus, PoseStatus, TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import GROUND, Ground, copy_soil, new_ground
 
-SIGMAS = 3.0
-"""Default number of standard deviations by which the map's heights may be wrong."""
 BOUNDS_EFFORT = 50
 """Time to bound a pose over the time to predict it with equal torques."""
 

@@ -31,7 +31,12 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, join_crossings, none_held
 from rover_physics.prediction.servo_path import write_servo_path
 from rover_physics.prediction.sweep import SweptPath
-from rover_physics.results.record import place_results, select_results, unwritten_results
+from rover_physics.results.record import (
+    QUANTITIES,
+    place_results,
+    select_results,
+    unwritten_results,
+)
 from rover_physics.results.uses import find_uses
 from rover_physics.rover.extent import find_reach
 from rover_physics.status import PoseStatus, Stall
@@ -52,7 +57,7 @@ EVEN, EVEN_SHARE = 0.1, 0.3
 error that counts there: on a plane, forces follow from statics alone."""
 SUMS = ("turn_off", "slide_off", "lift_height")
 """Quantities of limits that are sums along the path."""
-OF_PATH = ("falling", "wheel_drop", "drift", "lift_height")
+OF_PATH = tuple(one.name for one in QUANTITIES if one.of_path)
 """Quantities that the path around a pose decides."""
 OF_SLOTS = ("speed_share", "stalls")
 """Quantities that it decides if wheels are not on speed servos: whether one is wedged."""

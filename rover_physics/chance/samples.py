@@ -13,7 +13,7 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.rover.uncertainty import Uncertainty
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import new_ground, with_soils
-from rover_physics.terrain.terrain_file import GRIDS
+from rover_physics.terrain.layers import GRID_LAYERS
 
 DEVIATES = {
     "friction": 1,
@@ -184,7 +184,7 @@ def cut_around(terrain: Terrain, places: Floats, margin: float) -> Terrain:
     columns, rows = (slice(a, b + 2) for a, b in zip(first, last, strict=True))
     layers: dict[str, Any] = {
         name: None if layer is None else np.ascontiguousarray(layer[rows, columns])
-        for name in GRIDS
+        for name in GRID_LAYERS
         for layer in (getattr(terrain, name),)
     }
     x, y = np.asarray(terrain.origin) + terrain.resolution * first

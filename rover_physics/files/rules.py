@@ -33,8 +33,8 @@ class Rule:
         return core_schema.custom_error_schema(schema, "rule", custom_error_message=self.must)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        """Add the unit to the description of the type."""
-        return {**handler(schema), "unit": self.unit}
+        """Add the rule to the description of the type."""
+        return {**handler(schema), "rule": self}
 
     def _check(self, value: Any) -> Any:
         if not self.holds(value):

@@ -10,6 +10,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from rover_physics.errors import RoverError, RoverFileError
+from rover_physics.files.rules import Rule, number
+from rover_physics.numerics.plausible import MAX_COORDINATE
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -24,6 +26,8 @@ MAX_SHOWN = 60
 """Largest number of characters of a value or key in an error text."""
 MAX_FILE_SHOWN = 150
 """Largest number of characters of a file's name in an error text."""
+ANY_NUMBER = number("", least=-MAX_COORDINATE, most=MAX_COORDINATE)
+"""Rule of a number that may be anything a model can compute with."""
 Key = tuple[str | int, ...]
 
 _brief = reprlib.Repr()
@@ -59,9 +63,11 @@ def read_as(kind: Any, data: object, what: str, at: Key = ()) -> Any:
     raise RoverFileError(_describe_fault(kind, first, what, at))
 
 
-def find_unit(kind: Any, key: Key) -> str:
-    """Return the unit of the number at a key of a type, empty if it has none."""
-    return str(_part(kind, key).get("unit", ""))
+@cache
+def find_rule(kind: Any, key: Key) -> Rule:
+    """Return the rule of the number at a key of a type; that of any number if it has none."""
+    rule: Rule = _part(kind, key).get("rule", ANY_NUMBER)
+    return rule
 
 
 def refuse(key: str, value: object, must: str) -> RoverFileError:
@@ -185,7 +191,7 @@ def _part(kind: Any, key: Key) -> dict[str, Any]:
             if not isinstance(inner, dict):
                 return {}
         elif isinstance(name, str):
-            inner = part["properties"][name]
+            inner = part["properties"].get(name, {})
         else:
             inner = part["prefixItems"][name] if "prefixItems" in part else part["items"]
         part = _resolve(inner, schema)

@@ -5,8 +5,6 @@ A number beyond them is an error of units or a damaged message. Within them, pro
 stay far from the range of floating-point numbers.
 """
 
-import math
-
 MAX_COORDINATE = 1e9
 """Largest coordinate, height or distance [m]; Jupiter's radius is 7e7 m. Doubles are exact to
 1e-7 m there."""
@@ -24,8 +22,6 @@ MIN_SPEED, MAX_SPEED = 1e-9, 1e6
 """Smallest and largest speed [m/s] or wheel rate [rad/s]."""
 MIN_STEERING = 1e-6
 """Smallest limit of a steering angle [rad]."""
-MAX_DROOP = math.nextafter(1.0, 0.0)
-"""Largest droop of a servo: below 1, as it would stand still at full torque."""
 MIN_TORQUE, MAX_TORQUE = 1e-9, 1e9
 """Smallest and largest torque of a drive [N m]."""
 MAX_FORCE = 1e9

@@ -6,7 +6,7 @@ headings. Here each pose keeps only the uses of the limits, and the numbers that
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -28,8 +28,6 @@ BATCH = 32_768
 """Approximate number of poses of a map that are scored at a time."""
 PART = 4096
 """Number of poses whose results are in memory at a time."""
-SCORE_ROWS = 6
-"""Numbers in a score, without the status and the uses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +61,10 @@ class PoseScores:
     def passable(self) -> NDArray[np.bool_]:
         """True where the rover settles and keeps all its limits."""
         return ~np.asarray((self.uses > 1.0).any(axis=-1))
+
+
+SCORES = tuple(one.name for one in fields(PoseScores))[3:]
+"""Names of the numbers in a score, besides limits, status and uses."""
 
 
 def score_poses(
@@ -126,7 +128,7 @@ def sweep_map(
 def score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
     """Score poses (n, 3) and return scores of `shape`, which has n elements."""
     n, limits = len(poses), model.limits
-    status, numbers = np.empty(n, np.int8), np.empty((SCORE_ROWS, n), np.float32)
+    status, numbers = np.empty(n, np.int8), np.empty((len(SCORES), n), np.float32)
     uses = np.empty((n, len(limits)), np.float32)
     with limit_threads(model.relative_cost(n)):
         for first in range(0, n, PART):
@@ -139,7 +141,7 @@ def score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pose
 
 
 def find_scores(results: Any) -> Floats:
-    """Return the numbers (SCORE_ROWS, n) of RESULTs (n,), in the order of `PoseScores`."""
+    """Return the numbers (k, n) of RESULTs (n,), in the order of SCORES."""
     settled = results["status"] == PoseStatus.SETTLED
     use = results["friction_utilisation"].max(axis=1)
     use[~(results["speed_share"] > 0.0)] = np.inf

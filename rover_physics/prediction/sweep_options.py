@@ -12,7 +12,7 @@ from rover_physics.numerics import plausible as known
 from rover_physics.rover.manipulator import as_vector
 from rover_physics.status import TorquePolicy
 
-POLICIES = {name: TorquePolicy[name.upper()] for name in TORQUE_POLICIES}
+POLICIES = dict(zip(TORQUE_POLICIES, TorquePolicy, strict=True))
 """Torque policies by name."""
 
 JointAngles = tuple[tuple[str, float], ...]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one record of what is predicted at a pose: a new quantity is one row of QUANTITIES."""
+"""The one record of what is predicted at a pose: a new quantity is one row of QUANTITIES.
+
+`prediction.evaluation` computes it, under policy "servo" `forces.servo`.
+"""
 
 from typing import Any, NamedTuple
 

@@ -2,33 +2,17 @@
 """Checks of a rover: parameters that agree, a stand on flat ground, numbers that are plausible."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import is_dataclass
 from typing import Any
 
 from rover_physics.errors import ModelError
-from rover_physics.files.validation import refuse
+from rover_physics.files.validation import ANY_NUMBER, Key, find_rule, refuse, show_key
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEEL_POSITIONS
-from rover_physics.numerics import plausible as known
 from rover_physics.rover.model import Rover
 from rover_physics.rover.uncertainty import MAX_DEVIATION
 
 _LEVEL_TOLERANCE = 1e-3  # m, largest height difference of level wheels
-
-
-RANGES = {
-    "gravity": (known.MIN_GRAVITY, known.MAX_GRAVITY),
-    "friction": (known.MIN_FRICTION, known.MAX_FRICTION),
-    "nominal_speed": (known.MIN_SPEED, known.MAX_SPEED),
-    "wheel.radius": (known.MIN_LENGTH, known.MAX_LENGTH),
-    "wheel.width": (known.MIN_LENGTH, known.MAX_LENGTH),
-    "wheel.max_torque": (known.MIN_TORQUE, known.MAX_TORQUE),
-    "wheel.max_speed": (known.MIN_SPEED, known.MAX_SPEED),
-    "wheel.servo_droop": (0.0, known.MAX_DROOP),
-    "steering.limit": (known.MIN_STEERING, math.pi),
-    "steering.rate": (known.MIN_SPEED, known.MAX_SPEED),
-}
-"""Smallest and largest values by dotted key, in SI units."""
 
 
 Demand = tuple[bool, str, object, str]
@@ -143,31 +127,29 @@ def _of_manipulator(rover: Rover) -> Iterator[Demand]:
 
 
 def check_plausible(rover: Rover) -> None:
-    """Check that each number of a rover, which need not come from a file, is in a plausible range.
+    """Check that each number of a rover, which need not come from a file, keeps the file's rule.
+
+    Limits may be any numbers: code lifts them.
 
     Raises:
-        ModelError: A number that is not; the text names its key in a rover file and the range.
+        ModelError: A number that does not; the text names its key in a rover file and the rule.
     """
-    for key, number in _numbers_of(rover):
-        least, most = RANGES.get(key, (-known.MAX_COORDINATE, known.MAX_COORDINATE))
-        if key.endswith("mass"):
-            least, most = 0.0, known.MAX_MASS
-        if not least <= number <= most:
-            raise ModelError(
-                f"rover {rover.name!r}: {key} is {number}; it must be from {least:g} to {most:g}"
-            )
+    for key, value in _numbers_of(rover):
+        rule = ANY_NUMBER if key[0] == "limits" else find_rule(Rover, key)
+        if not rule.holds(value):
+            raise ModelError(f"rover {rover.name!r}: {refuse(show_key(key), value, rule.must)}")
 
 
-def _numbers_of(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
-    """Yield dotted keys and numbers of nested dataclasses, dicts and tuples."""
-    parts: Sequence[tuple[str | int, Any]] = ()
+def _numbers_of(value: Any, key: Key = ()) -> Iterator[tuple[Key, float]]:
+    """Yield keys and numbers of nested dataclasses, dicts and tuples."""
+    parts: Iterable[tuple[str | int, Any]] = ()
     if is_dataclass(value):
-        parts = [(field.name, getattr(value, field.name)) for field in fields(value)]
+        parts = vars(value).items()
     elif isinstance(value, dict):
-        parts = list(value.items())
+        parts = value.items()
     elif isinstance(value, tuple):
-        parts = list(enumerate(value))
+        parts = enumerate(value)
     elif isinstance(value, int | float):
         yield key, value
     for name, inner in parts:
-        yield from _numbers_of(inner, f"{key}.{name}" if key else str(name))
+        yield from _numbers_of(inner, (*key, name))

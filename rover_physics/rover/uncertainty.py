@@ -9,6 +9,8 @@ from rover_physics.numerics.plausible import MAX_MASS
 
 ACCEPTED_CHANCE = 0.05
 """Largest chance of failure of a traversable path if none is told: one drive of twenty."""
+SIGMAS = 3.0
+"""Number of standard deviations by which a map's heights may be wrong if none is told."""
 MAX_DEVIATION = 0.35
 """Largest standard deviation over the value: about three of them leave it above 0."""
 Relative = Annotated[float, number("", least=0.0, most=MAX_DEVIATION)]

@@ -85,14 +85,6 @@ def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArr
     return std
 
 
-LAYER_CHECKS = {
-    "friction": as_friction,
-    "elevation_std": as_elevation_std,
-    "ground_class": as_ground_class,
-}
-"""Checks of the optional layers of numbers, given the checked elevation."""
-
-
 def as_resolution(value: Any) -> float:
     """Return the cell size [m] as a float from MIN_RESOLUTION to MAX_RESOLUTION."""
     number = np.asarray(value)

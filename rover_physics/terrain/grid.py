@@ -16,14 +16,14 @@ from rover_physics.files.user_file import open_regular_file
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.arrays import freeze_array, seal_array
 from rover_physics.terrain.checks import (
-    LAYER_CHECKS,
     as_elevation,
     as_origin,
     as_resolution,
     as_soil,
     as_soil_names,
 )
-from rover_physics.terrain.terrain_file import GRIDS, MAX_CELLS, find_terrain_file, read_entries
+from rover_physics.terrain.layers import GRID_LAYERS
+from rover_physics.terrain.terrain_file import MAX_CELLS, find_terrain_file, read_entries
 
 DIGITS = 16
 """Hexadecimal digits of a fingerprint."""
@@ -80,9 +80,9 @@ class Terrain:
             raise TerrainError(
                 f"soil_names are {', '.join(soil_names)} without a soil layer that points to them"
             )
-        for name, check in LAYER_CHECKS.items():
-            if getattr(self, name) is not None:
-                checked[name] = check(getattr(self, name), elevation)
+        for name, layer in GRID_LAYERS.items():
+            if layer.check is not None and getattr(self, name) is not None:
+                checked[name] = layer.check(getattr(self, name), elevation)
         for name, value in checked.items():
             frozen = freeze_array(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, frozen)
@@ -104,7 +104,7 @@ class Terrain:
         alike.
         """
         digest = hashlib.sha256(np.array([self.resolution, *self.origin], "<f8").tobytes())
-        for name in GRIDS:
+        for name in GRID_LAYERS:
             layer = getattr(self, name)
             if layer is not None:
                 digest.update(f"{name} {layer.shape} ".encode())
@@ -249,9 +249,9 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: Any) -> None:
     entries: dict[str, Any] = dict(notes)
     entries["resolution"] = np.float64(terrain.resolution)
     entries["origin"] = np.asarray(terrain.origin)
-    for layer in GRIDS:
-        if getattr(terrain, layer) is not None:
-            entries[layer] = getattr(terrain, layer)
+    for name in GRID_LAYERS:
+        if getattr(terrain, name) is not None:
+            entries[name] = getattr(terrain, name)
     if terrain.soil_names:
         entries["soil_names"] = np.array(terrain.soil_names)
     with errors_of(path, TerrainError):

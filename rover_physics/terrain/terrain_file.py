@@ -10,19 +10,11 @@ from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.config_files import find_config, find_file
 from rover_physics.files.npz_file import NUMBERS, NpzReader
 from rover_physics.numerics.arrays import seal_array
+from rover_physics.terrain.layers import GRID_LAYERS
 
 MAX_CELLS = 25_000_000
 """Default of the largest terrain [cells]."""
 REQUIRED = ("elevation", "resolution", "origin")
-GRIDS: dict[str, type | None] = {
-    "elevation": np.float64,
-    "friction": np.float64,
-    "elevation_std": np.float64,
-    "soil": None,
-    "ground_class": np.float64,
-}
-"""Entries with a value for each cell, and the types they are read as; None keeps that of the file.
-A fingerprint counts them in this order."""
 SMALL = {"resolution": 100, "origin": 100, "soil_names": 250_000}
 """Other entries, and the largest numbers of their values or characters."""
 
@@ -71,7 +63,9 @@ def read_entries(file: BinaryIO, max_cells: int) -> dict[str, Any]:
     entries = {
         name: archive.read(name, most=most) for name, most in SMALL.items() if name in there
     }
-    for name, dtype in GRIDS.items():
+    for name, layer in GRID_LAYERS.items():
         if name in there:
+            # Whole numbers are checked in the type of the file, where none is rounded yet.
+            dtype = layer.kind if layer.kind is np.float64 else None
             entries[name] = archive.read(name, most=max_cells, kinds=NUMBERS, dtype=dtype)
     return {name: seal_array(values) for name, values in entries.items()}

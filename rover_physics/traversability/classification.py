@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.bounds.path import SIGMAS, is_uncertain
+from rover_physics.bounds.path import is_uncertain
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.names import CONTROL_POLICIES, EQUAL, TORQUE_POLICIES, WHEELS
 from rover_physics.numerics.interruption import check_interruption
@@ -16,6 +16,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import SIGMAS
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_poses
 from rover_physics.traversability.verdict import Verdict, explain_rows
@@ -24,8 +25,12 @@ PASSABLE = "passable"
 WITH_SPEED_SERVOS = "passable with speed servos"
 WITH_TRACTION_CONTROL = "passable with traction control"
 IMPASSABLE = "impassable"
-TRAVERSABILITY_CLASSES = (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IMPASSABLE)
-"""The classes, from best to worst: by the first of TORQUE_POLICIES that passes, or none."""
+OF_POLICY = dict(
+    zip(TORQUE_POLICIES, (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL), strict=True)
+)
+"""The class of what passes first under a policy."""
+TRAVERSABILITY_CLASSES = (*OF_POLICY.values(), IMPASSABLE)
+"""The classes, from best to worst."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +212,7 @@ def _decision(
 ) -> ClassifiedWaypoint:
     """Return what decides a waypoint under one policy."""
     name = WHEELS[wheel] if wheel >= 0 else ""
-    found = IMPASSABLE if reason else TRAVERSABILITY_CLASSES[TORQUE_POLICIES.index(policy)]
+    found = IMPASSABLE if reason else OF_POLICY[policy]
     return ClassifiedWaypoint(found, policy, code, name, margin, reason)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
+from rover_physics.bounds.path import bound_path, check_sigmas
 from rover_physics.chance.failure_chance import check_accepted_chance, find_failure_chance
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.names import EQUAL, OPTIMAL
@@ -28,6 +28,7 @@ from rover_physics.prediction.sweep import (
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import SIGMAS
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.entrapment import (
     Course,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.bounds.path import SIGMAS, is_uncertain
+from rover_physics.bounds.path import is_uncertain
 from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import exact_kernel
@@ -35,6 +35,7 @@ from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import place_results, select_results, unwritten_results
 from rover_physics.results.uses import find_codes, find_risk, find_uses, limits_of
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import SIGMAS
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_paths

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.bounds.path import SIGMAS, is_uncertain
+from rover_physics.bounds.path import is_uncertain
 from rover_physics.limits import table
 from rover_physics.names import CONTROL_POLICIES, TORQUE_POLICIES
 from rover_physics.numerics.arrays import view_read_only
@@ -31,6 +31,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import unwritten_results
 from rover_physics.results.uses import RoverLimits, find_broken
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import SIGMAS
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability import classification

@@ -24,19 +24,11 @@ from rover_physics.rover.manipulator import (
 from rover_physics.rover.model import Manipulator, Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_poses
-from rover_physics.traversability.verdict import Verdict
+from rover_physics.traversability.verdict import EXTREMES, Verdict
 
 NO_LOAD = (0.0, 0.0, 0.0)
 """Neither force nor moment on the tool."""
-OF_THE_VERDICT = (
-    "policy",
-    "min_tip_over_ratio",
-    "max_friction_utilisation",
-    "max_torque_saturation",
-    "max_tilt",
-    "min_belly_clearance",
-    "max_sinkage",
-)
+OF_THE_VERDICT = ("policy", *(name for name in EXTREMES if name != "max_wheel_drop"))
 """Fields of the verdict that `ReachAnswer.to_dict` includes."""
 PER_WHEEL = ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation")
 """Values of each wheel that it includes, in the order of `names.WHEELS`."""

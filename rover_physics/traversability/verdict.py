@@ -35,24 +35,6 @@ UNSETTLED = {
 }
 """Code and reason of the status of a row that is not settled; the reason of steering depends on
 the row."""
-EXTREMES = {
-    "min_tip_over_ratio": ("tip_over_ratio", np.fmin),
-    "max_friction_utilisation": ("friction_utilisation", np.fmax),
-    "max_torque_saturation": ("torque_saturation", np.fmax),
-    "max_tilt": ("tilt", np.fmax),
-    "min_belly_clearance": ("belly_clearance", np.fmin),
-    "max_wheel_drop": ("wheel_drop", np.fmax),
-    "max_sinkage": ("sinkage", np.fmax),
-}
-"""Fields of a verdict that are the extreme of a quantity, and which of two values is worse."""
-BOUND_EXTREMES = {
-    "tip_over_ratio_bound": np.fmin,
-    "friction_utilisation_bound": np.fmax,
-    "torque_saturation_bound": np.fmax,
-    "tilt_bound": np.fmax,
-    "belly_clearance_bound": np.fmin,
-}
-"""Fields of a verdict that are the worst case on an uncertain map."""
 _UNBOUNDED = {
     BoundStatus.ON_EDGE: ("not_settled", "a wheel may climb or fall off an edge"),
     BoundStatus.UNKNOWN_NEAR: ("unknown_ground", "a wheel may reach unknown ground"),
@@ -119,6 +101,23 @@ class Verdict:
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as JSON types: lists for tuples, None for NaN and infinity."""
         return to_plain({field.name: getattr(self, field.name) for field in fields(self)})
+
+
+_FIELDS = tuple(one.name for one in fields(Verdict))
+EXTREMES = {
+    name: (name.removeprefix(worst), worse)
+    for name in _FIELDS
+    for worst, worse in (("min_", np.fmin), ("max_", np.fmax))
+    if name.startswith(worst)
+}
+"""Fields of a verdict that are the extreme of a quantity, as their names say: the quantity, and
+which of two values is worse."""
+WORSE = dict(EXTREMES.values())
+"""The same by the quantity."""
+BOUND_EXTREMES = {
+    name: WORSE[name.removesuffix("_bound")] for name in _FIELDS if name.endswith("_bound")
+}
+"""Fields that are the worst case on an uncertain map, and which of two values is worse."""
 
 
 def codes_of_verdicts() -> tuple[str, ...]:

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice on a refused path: the remedies, best first, and whether all levers were tried."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.interruption import interruptible
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.advice.case import Case, JudgedCase
@@ -76,45 +75,28 @@ class Advice:
 
 
 def grow_advice(case: Case) -> Iterator[Advice]:
-    """Yield advice that grows with each trial; the last one is complete.
-
-    Raises:
-        RoverError: The model refuses the path or an option.
-    """
-    judged = case.judge()
-    advice = Advice(judged)
-    if not judged.passes:
-        yield advice
-        for levers, remedy in seek_remedies(judged):
-            found = advice.found if remedy is None else (*advice.found, remedy)
-            tried = tuple(lever.name for lever in levers)
-            advice = replace(advice, found=tuple(sorted(found, key=_rank)), tried=tried)
-            yield advice
-    yield replace(advice, complete=True)
-
-
-def grow_within(case: Case, check: Callable[[], object]) -> Iterator[Advice]:
-    """Yield advice that grows until it is complete, or is stopped.
-
-    Args:
-        case: The refused path.
-        check: Called again and again; it stops the work by a QuestionStoppedError.
+    """Yield advice that grows with each trial; the last one is complete unless it was stopped.
 
     Raises:
         QuestionStoppedError: Not even the path itself was judged; it says STOPPED.
         RoverError: The model refuses the path or an option.
     """
-    growing, advice = grow_advice(case), None
+    advice = None
     try:
-        while True:
-            with interruptible(check):
-                advice = next(growing)
+        judged = case.judge()
+        advice = Advice(judged)
+        if not judged.passes:
             yield advice
-    except StopIteration:
-        return
+            for levers, remedy in seek_remedies(judged):
+                found = advice.found if remedy is None else (*advice.found, remedy)
+                tried = tuple(lever.name for lever in levers)
+                advice = replace(advice, found=tuple(sorted(found, key=_rank)), tried=tried)
+                yield advice
     except QuestionStoppedError as error:
         if advice is None:
             raise QuestionStoppedError(error.code, STOPPED) from error
+        return
+    yield replace(advice, complete=True)
 
 
 def refuse(code: str, reason: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.limits.table import CHANCE, TRAPPED, Sense
-from rover_physics.names import SERVO, WHEEL_POSITIONS
+from rover_physics.names import SERVO
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
@@ -17,14 +17,12 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
-from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.path_search import find_path
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
@@ -84,7 +82,7 @@ class Case:
             accepted_chance=self.site.options.accepted_chance,  # 1, too: the chance is told
         )
         path = self.site.refuse_ground(Candidate(self.poses, *judged))
-        return JudgedCase(self, path.prediction, path.verdict)
+        return JudgedCase(**vars(path), case=self)
 
 
 def case_of(site: Site, poses: Floats) -> Case:
@@ -96,15 +94,11 @@ def case_of(site: Site, poses: Floats) -> Case:
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedCase:
-    """A case with its prediction and verdict; where it is refused, where and by what it fails."""
+class JudgedCase(Candidate):
+    """The path of a case as it was judged; where it is refused, where and by what it fails."""
 
     case: Case
     """The case."""
-    prediction: PathPrediction
-    """The prediction, perhaps only up to the first failure."""
-    verdict: Verdict
-    """The verdict."""
 
     @property
     def passes(self) -> bool:
@@ -149,11 +143,6 @@ class JudgedCase:
     def distance(self) -> Floats:
         """(n,) distance along the path [m]."""
         return distance_along(self.case.poses)
-
-    def loads_of_axles(self, waypoint: int) -> dict[str, float]:
-        """Return the load [N] of each axle at a waypoint by its name; NaN where unknown."""
-        loads = self.prediction.wheel_loads[waypoint]
-        return {name: float(loads[k] + loads[k + 3]) for k, name in enumerate(WHEEL_POSITIONS)}
 
     @property
     def place(self) -> int:

@@ -111,13 +111,14 @@ class Remedy:
         """Return how the load of the axle changes most where the refused path fails."""
         if self.judged.case.poses is not self.refusal.case.poses:
             return ""
-        old, new = (one.loads_of_axles(self.refusal.place) for one in (self.refusal, self.judged))
-        change = {name: new[name] - old[name] for name in WHEEL_POSITIONS}
-        name = max(change, key=lambda one: abs(change[one]))
-        if not abs(change[name]) > TELLING_LOAD * self.refusal.case.rover.weight:
+        both = (self.refusal, self.judged)
+        old, new = (one.prediction.wheel_loads[self.refusal.place] for one in both)
+        change = (new - old).reshape(2, 3).sum(axis=0)  # of each axle
+        most = int(np.abs(change).argmax())
+        if not abs(change[most]) > TELLING_LOAD * self.refusal.case.rover.weight:
             return ""  # or unknown
-        more = "more" if change[name] > 0.0 else "less"
-        return f": the {name} wheels then carry {abs(change[name]):.1f} N {more}"
+        more, axle = "more" if change[most] > 0.0 else "less", WHEEL_POSITIONS[most]
+        return f": the {axle} wheels then carry {abs(change[most]):.1f} N {more}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the remedy as JSON types."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE, SIGMAS
 from rover_planner.command import shared
 from rover_planner.command.shared import argument, option, picture_option, read_arm_angles
 
@@ -29,7 +29,7 @@ def advise(
     soil: shared.SoilName = None,
     arm: shared.ArmAngles = None,
     payload: shared.Payload = None,
-    sigmas: shared.Sigmas = 3.0,
+    sigmas: shared.Sigmas = SIGMAS,
     accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     budget: Annotated[float, option("S", "Time for the advice in s.", min=0.01)] = 10.0,
     picture: Annotated[
@@ -41,16 +41,17 @@ def advise(
 
     Exit code 0: it ran, with any answer. 2: bad input.
     """
+    from rover_physics.numerics.interruption import interruptible
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
-    from rover_planner.advice.advise import STOPPED, grow_within, path_of, refuse
+    from rover_planner.advice.advise import STOPPED, grow_advice, path_of, refuse
     from rover_planner.advice.case import Case
     from rover_planner.command.prediction_files import read_poses
     from rover_planner.nodes.warm_up import prepare_search
     from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
     from rover_planner.planning.path_query import PathQueryOptions, waypoint_spacing_for
-    from rover_planner.planning.search.site import Site
+    from rover_planner.planning.search.query import Site
     from rover_planner.shell.progress import show_progress
 
     shared.keep_inputs((rover, terrain, poses), out, picture)
@@ -75,8 +76,9 @@ def advise(
         with show_progress() as progress:
             progress("load the model (the first run compiles it)")
             prepare_search(site)
-            for advice in grow_within(case, Budget(budget).check):
-                progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
+            with interruptible(Budget(budget).check):
+                for advice in grow_advice(case):
+                    progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
     except KeyboardInterrupt:
         if advice is None or not advice.found:
             typer.echo(STOPPED, err=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE, SIGMAS
 from rover_planner.command import shared
 from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.shell.poses import GOAL, START, Pose
@@ -41,7 +41,7 @@ def plan(
         bool,
         flag("--frontier", "Plan as near as possible to a goal on unknown ground or off the map."),
     ] = False,
-    sigmas: shared.Sigmas = 3.0,
+    sigmas: shared.Sigmas = SIGMAS,
     accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     chance_weight: Annotated[
         float, option("M", "Length in m that a path may be longer to fail never, not always.")
@@ -60,9 +60,12 @@ def plan(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.planning.path_query import PathQueryOptions
-    from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-    from rover_planner.planning.search.query_file import write_query
-    from rover_planner.planning.search.site import Site
+    from rover_planner.planning.search.query import (
+        LatticeSettings,
+        SearchQuery,
+        Site,
+        write_query,
+    )
 
     shared.keep_inputs((rover, terrain), out, dump, picture)
     settings = LatticeSettings(
@@ -89,7 +92,7 @@ def replay_plan(
     max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Search the path of a question again that `plan --dump` has written."""
-    from rover_planner.planning.search.query_file import read_query
+    from rover_planner.planning.search.query import read_query
 
     shared.keep_inputs((question,), out, picture)
     asked, settings = read_query(question, max_cells)
@@ -106,7 +109,7 @@ def _ask(
     """Search the path, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
     from rover_planner.nodes.warm_up import prepare_search
-    from rover_planner.planning.assumptions import assume
+    from rover_planner.planning.path_query import assume
     from rover_planner.planning.search.path_search import find_path
     from rover_planner.shell.progress import show_progress
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE, SIGMAS
 from rover_planner.command import shared
 from rover_planner.command.shared import argument, flag, option, read_arm_angles
 
@@ -56,7 +56,7 @@ def predict(
             "The rover drives backwards where poses do not tell: single ones, long steps.",
         ),
     ] = False,
-    sigmas: shared.Sigmas = 3.0,
+    sigmas: shared.Sigmas = SIGMAS,
     classes: Annotated[
         bool, flag("--classes", "Add the class of each waypoint, by all torque policies.")
     ] = False,

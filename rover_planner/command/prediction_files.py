@@ -16,7 +16,7 @@ from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import BOUNDED_VALUES, PathPrediction, prediction_of
-from rover_physics.results.record import QUANTITIES
+from rover_physics.results.record import QUANTITIES, VIEWS
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
@@ -24,7 +24,7 @@ from rover_physics.traversability.judge import PartwiseJudge, judge_path, judge_
 from rover_physics.traversability.torque_ranges import TorqueRanges, find_torque_ranges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import (
+from rover_planner.planning.path_query import (
     Assumptions,
     assume,
     read_assumptions,
@@ -33,15 +33,11 @@ from rover_planner.planning.assumptions import (
 
 Shape = tuple[int, ...]
 
-ARRAYS: dict[str, Shape] = {
-    "poses": (3,),
-    "status": (),
-    "settled": (),
-    "position": (3,),
-    "roll": (),
-    "pitch": (),
-    "bogie_angle": (2,),
-} | {one.name: one.shape for one in QUANTITIES if one.is_kept}
+ARRAYS: dict[str, Shape] = (
+    {"poses": (3,), "status": (), "settled": (), "position": (3,)}
+    | {name: VIEWS[name][2] for name in ("roll", "pitch", "bogie_angle")}
+    | {one.name: one.shape for one in QUANTITIES if one.is_kept}
+)
 """Arrays of a prediction in the output file, under the same names: shape of a waypoint's part."""
 TYPES: dict[str, tuple[str, DTypeLike]] = {
     "settled": (FLAGS, np.bool_), "falling": (FLAGS, np.bool_), "status": (NUMBERS, np.int8)

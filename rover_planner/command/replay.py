@@ -144,7 +144,7 @@ class _Results:
         """Write prediction and measurements of an answer; return their entries of the report."""
         from rover_physics.files.npz_file import write_npz
         from rover_planner.command.prediction_files import write_prediction
-        from rover_planner.planning.assumptions import assume
+        from rover_planner.planning.path_query import assume
 
         candidate = answer.judgement.candidate
         if candidate is None or answer.terrain is None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rover_physics.rover.uncertainty import SIGMAS
 from rover_planner.command import shared
 from rover_planner.command.shared import argument, flag, option, picture_option
 from rover_planner.errors import PlanningError
@@ -38,7 +39,7 @@ def survey(
     chance: Annotated[
         bool, flag("--chance", "Find the chances of failure, too; takes up to 30 x.")
     ] = False,
-    sigmas: shared.Sigmas = 3.0,
+    sigmas: shared.Sigmas = SIGMAS,
     max_gap: shared.MaxGap = 0.0,
     scheduler: Annotated[
         str | None, option("ADDRESS", "Dask scheduler, tcp://...; default: this machine's cores.")

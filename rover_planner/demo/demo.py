@@ -34,8 +34,7 @@ from rover_planner.maps.known_map import describe_terrain
 from rover_planner.planning.path_query import PathAnswer, add_path
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
-from rover_planner.planning.search.query import SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import SearchQuery, Site
 from rover_planner.shell.extras import need
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK

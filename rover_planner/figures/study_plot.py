@@ -20,7 +20,7 @@ NOW = {"marker": "s", "color": "#009E73", "markersize": 7, "label": "as it is"}
 """Colours that are safe for colour-blind readers (Okabe and Ito); each has its own marker."""
 SIZE = (6.0, 4.0)
 """Width and height of the picture [inch]."""
-EQUAL = 1.0 / 6.0
+EQUAL_SHARE = 1.0 / 6.0
 """Load share of a wheel if all carry alike."""
 
 
@@ -57,12 +57,12 @@ def _draw_shares(figure: Figure, result: StudyResult) -> Axes:
     for k, trial in enumerate((result.baseline, result.best)):
         for j, (axle, colour) in enumerate(WHEEL_COLOURS.items()):
             share = 0.5 * (trial.load_shares[j] + trial.load_shares[j + 3])
-            x, y = k + 0.27 * (j - 1), max(share, EQUAL) + 0.004
+            x, y = k + 0.27 * (j - 1), max(share, EQUAL_SHARE) + 0.004
             bars.bar(x, share, 0.25, color=colour, label=axle if k == 0 else None)
             bars.text(x, y, f"{share:.3f}", fontsize=8, rotation=90, ha="center", va="bottom")
-    bars.axhline(EQUAL, color="black", linewidth=1.0, linestyle="--", label="equal: 1/6")
+    bars.axhline(EQUAL_SHARE, color="black", linewidth=1.0, linestyle="--", label="equal: 1/6")
     bars.set_xticks((0, 1), ("as it is", "best"))
-    bars.set_ylim(0.0, 1.5 * max(*result.best.load_shares, EQUAL))
+    bars.set_ylim(0.0, 1.5 * max(*result.best.load_shares, EQUAL_SHARE))
     bars.set_title("load share of a wheel\non level ground", fontsize=9)
     bars.grid(visible=False)
     bars.legend(fontsize=7, ncols=2, loc="upper center", columnspacing=0.8, handlelength=1.2)

@@ -17,23 +17,16 @@ def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
         estimate: The estimate.
         told: Friction that was assumed before anything was measured.
     """
-    found: dict[str, Any] = {
-        "friction": asdict(estimate.friction),
-        "slip_time": estimate.slip_time,
-        "immobilised_time": estimate.immobilised_time,
-        "sides": {side: asdict(one) for side, one in estimate.sides.items()},
-        "classes": {number: asdict(one) for number, one in estimate.classes.items()},
+    found = asdict(estimate)
+    found |= {
         "told_friction": told,
         "mean_is": "the told friction, given the bound"
         if estimate.friction.high is None
         else "measured by wheels that slipped",
-        "resistance": {"mean": estimate.resistance, "std": estimate.resistance_std},
+        "resistance": {"mean": estimate.resistance, "std": found.pop("resistance_std")},
         "slip_ratios": dict(zip(WHEELS, estimate.slip_ratios, strict=True)),
-        "side_slip": estimate.side_slip,
-        "time": estimate.time,
-        "stuck": estimate.stuck,
-        "faults": estimate.faults,
     }
+    del found["soil"]
     if estimate.soil is not None:
         found["soil"] = _describe_soil(estimate.soil)
     contents: dict[str, Any] = to_plain(found)

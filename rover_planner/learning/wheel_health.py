@@ -14,7 +14,7 @@ from rover_planner.learning.stuck_watch import SLOWEST
 from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow
 
 RATE = "rate"
-"""Word of faults of a wheel's rate."""
+"""Word in each fault of a wheel's rate, and in no other."""
 FROZEN_TIME = 1.0
 """Time without any change, while values of other wheels change, of a frozen value [s]."""
 DOUBTFUL_TIME = 0.25
@@ -121,9 +121,6 @@ class WheelHealth:
         if self._excess > LEAST_EXCESS * self._weight:
             best = int(np.argmin(self._turned))
             signs[best] = self._turned[best] < SIGN_SHARE * self._excess
-        backward = self._backward > 0.6
-        if not (frozen.any() or signs.any() or backward.any()):
-            return found
         gone, frozen = frozen & missing, frozen & ~missing
         for word, mask in (
             ("no torque", gone[0]),
@@ -131,7 +128,7 @@ class WheelHealth:
             ("torque is frozen", frozen[0]),
             (f"{RATE} is frozen", frozen[1]),
             ("torque has the wrong sign", signs),
-            (f"{RATE} has the wrong sign", backward),
+            (f"{RATE} has the wrong sign", self._backward > 0.6),
         ):
             found |= {WHEELS[k]: word for k in np.flatnonzero(mask) if WHEELS[k] not in found}
         return found

@@ -5,13 +5,12 @@ A front camera never sees where the rover stands, but the rover does: where the 
 suspension and the place of the body are measured, so are the six points on which its wheels stand.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
@@ -27,32 +26,29 @@ SAME_PLACE = 2e-3
 """Change of each part of pose and suspension up to which a rover stands as before [m, rad]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Standing:
     """Measured pose and suspension of a rover that stands or creeps."""
 
-    x: float
-    """Body origin, map frame [m]."""
-    y: float
-    """[m]"""
-    z: float
-    """[m]"""
-    roll: float
-    """[rad]"""
-    pitch: float
-    """[rad]"""
-    yaw: float
-    """[rad]"""
-    suspension: Mapping[str, float]
-    """Angles [rad] of all SUSPENSION_JOINTS by name."""
+    pose: Floats
+    """(6,) x, y, z [m], roll, pitch, yaw [rad] of the body, map frame."""
+    suspension: Floats
+    """(4,) angles of SUSPENSION_JOINTS [rad]."""
 
     def is_like(self, other: "Standing") -> bool:
         """Return whether the rover has hardly moved: by less than SAME_PLACE in m and rad."""
-        mine, others = (
-            (one.x, one.y, one.z, one.roll, one.pitch, one.yaw, *one.suspension.values())
-            for one in (self, other)
-        )
-        return all(abs(a - b) < SAME_PLACE for a, b in zip(mine, others, strict=True))
+        mine, others = (np.concatenate([one.pose, one.suspension]) for one in (self, other))
+        return bool((np.abs(mine - others) < SAME_PLACE).all())
+
+    def place(self, rover: Rover) -> Any:
+        """Return the PLACEMENT of a rover's links.
+
+        The differential mirrors the rockers; the mean of both measurements is used.
+        """
+        placement, (right, left, *bogies) = new_record(PLACEMENT), self.suspension
+        q = np.array([*self.pose[2:5], 0.5 * (right - left), *bogies])
+        place(pack_linkage(rover), self.pose[[0, 1, 5]], q, placement)
+        return placement
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,13 +123,7 @@ def find_ground_beneath(rover: Rover, standing: Standing) -> GroundBeneath:
         rover: The rover.
         standing: What was measured.
     """
-    angles = [standing.suspension[name] for name in SUSPENSION_JOINTS]
-    # The differential mirrors the rockers; the mean of both measurements is used.
-    rocker = 0.5 * (angles[0] - angles[1])
-    q = np.array([standing.z, standing.roll, standing.pitch, rocker, angles[2], angles[3]])
-    pose = np.array([standing.x, standing.y, standing.yaw])
-    placement = new_record(PLACEMENT)
-    place(pack_linkage(rover), pose, q, placement)
+    placement, pose = standing.place(rover), standing.pose[[0, 1, 5]]
     centres = np.array(placement.centres)
     normal = _normal_of(centres)
     axle = np.array(placement.R)[:, 1]

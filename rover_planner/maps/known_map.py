@@ -30,8 +30,6 @@ class KnownMap:
     """Time of arrival [s], steady clock."""
     cells: CellSources | None = None
     """Source and time of each cell; None: all known cells are from `source`."""
-    frame: str = ""
-    """Frame of the map; empty if it has none."""
 
     @property
     def fingerprint(self) -> str:

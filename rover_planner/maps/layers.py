@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from msg_adapters.gridding import most_frequent
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.layers import GRID_LAYERS, GridLayer
 from rover_planner.maps.cells import SAME_PLACE, CellBox, CellGrid, grid_of
 
-LAYERS = ("elevation", "friction", "soil", "elevation_std", "ground_class")
-"""Layers of a map that count."""
 MAX_OFF_CENTRE = 0.02
 """Largest distance between the centres of a map's cells and those of the grid at which the map
 is taken without interpolation [cells]."""
@@ -26,20 +25,15 @@ FIRST_NAMES = ("unknown", "loaded", "contact", "footprint")
 """Their names."""
 
 
-EMPTY = {
-    "elevation": (np.float64, np.nan),
-    "elevation_std": (np.float64, np.nan),
-    "friction": (np.float64, np.nan),
-    "soil": (np.int32, -1),
-    "ground_class": (np.float64, np.nan),
-    "source": (np.uint8, UNKNOWN),
-    "time": (np.float64, -np.inf),
+LAYERS = GRID_LAYERS | {
+    "source": GridLayer(np.uint8, UNKNOWN),
+    "time": GridLayer(np.float64, -np.inf),
 }
-"""Type and empty value of each layer."""
+"""The layers of a map, source and time of each cell."""
 ALWAYS = ("elevation", "source", "time")
 """Layers that every window has."""
-LASTING = ("friction", "ground_class")
-"""Layers whose values stay where a newer map has none, and are never interpolated."""
+LASTING = tuple(name for name, layer in GRID_LAYERS.items() if layer.is_lasting)
+"""Layers whose values stay where a newer map has none."""
 
 Layer = NDArray[Any]
 Window = tuple[slice, slice]
@@ -72,7 +66,7 @@ class Patch:
     box: CellBox
     """The cells."""
     layers: dict[str, Layer]
-    """(rows, columns) by name: elevation and others of EMPTY; those of a window have ALWAYS."""
+    """(rows, columns) by name: elevation and others of LAYERS; those of a window have ALWAYS."""
 
     def moved_to(self, box: CellBox) -> "Patch":
         """Return the layers over another box; cells that this one lacks are empty."""
@@ -122,7 +116,9 @@ class Patch:
 def empty_patch(box: CellBox, names: tuple[str, ...] = ALWAYS) -> Patch:
     """Return a patch without known cells."""
     shape = box.rows, box.columns
-    layers = {name: np.full(shape, EMPTY[name][1], EMPTY[name][0]) for name in names}
+    layers: dict[str, Layer] = {
+        name: np.full(shape, LAYERS[name].unknown, LAYERS[name].kind) for name in names
+    }
     return Patch(box, layers)
 
 
@@ -181,7 +177,7 @@ def _cells_of(terrain: Terrain, grid: CellGrid) -> tuple[NDArray[np.intp], NDArr
 
 def layers_of(terrain: Terrain) -> dict[str, Layer]:
     """Return the layers that a terrain has, by name."""
-    layers = {name: getattr(terrain, name) for name in LAYERS}
+    layers = {name: getattr(terrain, name) for name in GRID_LAYERS}
     return {name: layer for name, layer in layers.items() if layer is not None}
 
 
@@ -196,8 +192,7 @@ def sample_layers(terrain: Terrain, column: Floats, row: Floats) -> dict[str, La
     left, right, along, on_columns = _bracket(column, nx)
     layers: dict[str, Layer] = {}
     for name, layer in layers_of(terrain).items():
-        kind, unknown = EMPTY[name]
-        if name in ("elevation", "elevation_std"):
+        if GRID_LAYERS[name].is_smooth:
             found = np.zeros(np.broadcast_shapes(below.shape, left.shape))
             for j, of_row in ((below, 1.0 - up), (above, up)):
                 for i, of_column in ((left, 1.0 - along), (right, along)):
@@ -205,7 +200,8 @@ def sample_layers(terrain: Terrain, column: Floats, row: Floats) -> dict[str, La
                     found += np.where(share == 0.0, 0.0, share * layer[j, i])
         else:
             found = layer[np.where(up < 0.5, below, above), np.where(along < 0.5, left, right)]
-        layers[name] = np.where(on_rows & on_columns, found, unknown).astype(kind)
+        known = np.where(on_rows & on_columns, found, GRID_LAYERS[name].unknown)
+        layers[name] = known.astype(GRID_LAYERS[name].kind)
     return layers
 
 
@@ -229,20 +225,20 @@ def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
     at = (rows - box.row)[:, None], (columns - box.column)[None, :]
     combined = empty_patch(box, tuple(layers_of(terrain)))
     for name, layer in layers_of(terrain).items():
-        into = combined.layers[name]
-        if name == "ground_class":
+        into, row = combined.layers[name], GRID_LAYERS[name]
+        if row.is_class:
             cells = np.ravel_multi_index(np.broadcast_arrays(*at), into.shape)
             found = most_frequent(cells.ravel(), layer.ravel(), box.cells)
             into[:] = found.reshape(into.shape)
         else:
-            (np.fmin if name == "friction" else np.fmax).at(into, at, layer)
+            (np.fmin if row.combined == "min" else np.fmax).at(into, at, layer)
     return combined
 
 
 def have_same_layers(old: Terrain, new: Terrain) -> bool:
     """Return whether two maps have the same layers, and the same soils in them."""
     return old.soil_names == new.soil_names and all(
-        (getattr(old, name) is None) == (getattr(new, name) is None) for name in LAYERS
+        (getattr(old, name) is None) == (getattr(new, name) is None) for name in GRID_LAYERS
     )
 
 
@@ -272,7 +268,7 @@ def find_changes(old: Terrain, new: Terrain, shift: Shift = (0, 0)) -> NDArray[n
     before, now = find_overlap(old, new, shift)
     inside = changed[1:-1, 1:-1]
     inside[now] = False
-    for name in LAYERS:
+    for name in GRID_LAYERS:
         one, other = getattr(old, name), getattr(new, name)
         if one is not None:
             a, b = one[before], other[now]

@@ -8,13 +8,14 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from msg_adapters.results.diagnostics import to_json
-from rover_planner.advice.advise import Advice, grow_within, refuse
+from rover_physics.numerics.interruption import interruptible
+from rover_planner.advice.advise import Advice, grow_advice, refuse
 from rover_planner.advice.case import case_of
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, Budget
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
-from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
+from rover_planner.planning.answering.questions import Asked, QuestionQueue
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import LATCHED_QOS
@@ -90,11 +91,11 @@ class AdviceTopics:
             return refusal("no_path", NOTHING_REFUSED)
         site, candidate, last = refused.site, refused.candidate, None
         assert site is not None and candidate is not None
-        case = case_of(site, candidate.poses)
-        for advice in grow_within(case, lambda: self._desk.give_way(check)):
-            if last is None or len(advice.found) > len(last.found):
-                self._node.handover.call(partial(self._publish, advice))
-            last = advice
+        with interruptible(lambda: self._desk.give_way(check)):
+            for advice in grow_advice(case_of(site, candidate.poses)):
+                if last is None or len(advice.found) > len(last.found):
+                    self._node.handover.call(partial(self._publish, advice))
+                last = advice
         assert last is not None
         return last
 

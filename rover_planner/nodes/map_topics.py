@@ -216,7 +216,7 @@ class MapCloud:
                 "source": known.cells.source,
                 "age": np.where(np.isfinite(known.received.elevation), age, np.nan),
             }
-        frame, stamp = known.frame or self._node.values.map_frame, self._node.get_clock().now()
+        frame, stamp = self._node.values.map_frame, self._node.get_clock().now()
         cloud = terrain_to_point_cloud(known.received, frame, stamp.to_msg(), more=more)
         with contextlib.suppress(InvalidHandle):  # the node has ended meanwhile
             self._publisher.send(cloud)

@@ -22,11 +22,9 @@ from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget
 from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement, refuse_for
-from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
-from rover_planner.planning.answering.questions import Question, Register
-from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
+from rover_planner.planning.answering.questions import Asked, Question, QuestionQueue, Register
 from rover_planner.planning.answering.server_health import ServerHealth
-from rover_planner.planning.answering.snapshot import Snapshot
+from rover_planner.planning.answering.snapshot import NewerMapError, SearchWatch, Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.deferred import PacedSender, Reply, serve_later
 from rover_planner.ros.node import RoverNode, create_steady_timer

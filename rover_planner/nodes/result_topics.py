@@ -2,8 +2,9 @@
 """Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -19,10 +20,11 @@ from msg_adapters.results.grids import NOT_REACHED, REACHED, occupancy_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import joint_trajectory, tip_over_array, wheel_array
 from msg_adapters.stamps import ns_to_stamp
+from rover_physics.numerics.plain_values import to_plain
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.judgement import IdentityReport, PathJudgement, VerdictReport
+from rover_planner.planning.answering.judgement import PER_WAYPOINT, IdentityReport, PathJudgement
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
@@ -122,9 +124,9 @@ class ResultMessages:
         return None if candidate is None else candidate.prediction
 
     @cached_property
-    def report(self) -> VerdictReport:
+    def report(self) -> dict[str, Any]:
         """The report, with what it is about."""
-        return replace(self.judgement.report, identity=self.identity)
+        return self.judgement.report | asdict(self.identity)
 
     @cached_property
     def plan(self) -> Path:
@@ -138,11 +140,11 @@ class ResultMessages:
 
     def verdict(self) -> DiagnosticArray:
         """Return the verdict and its summary."""
-        judgement, report = self.judgement, self.report
-        level = "error"
+        judgement, report, level = self.judgement, self.report, "error"
         if judgement.traversable:
-            level = "warning" if report.has_warning else "ok"
-        reason, entries = judgement.reason or "traversable", texts_of(report.summary())
+            level = "ok" if report.get("suspension_agrees", True) else "warning"
+        summary = {key: report[key] for key in report if key not in PER_WAYPOINT}
+        reason, entries = judgement.reason or "traversable", texts_of(to_plain(summary))
         status = make_status(VERDICT, level, reason, entries, self.rover.name)
         return DiagnosticArray(header=self.header, status=[status])
 

@@ -21,6 +21,7 @@ from msg_adapters.results.diagnostics import HEALTH, MONITOR, make_status, to_js
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
+from rover_physics.numerics.plain_values import to_plain
 from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.maps.known_map import describe_terrain, stamp_text
 from rover_planner.nodes.advice_topics import AdviceTopics
@@ -280,7 +281,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
     ) -> None:
         report = self.publish(answer.judgement, answer.identity).report
         response.success = answer.judgement.traversable
-        response.message = to_json(report.to_dict())
+        response.message = to_json(to_plain(report))
 
     def publish(self, judgement: PathJudgement, identity: IdentityReport) -> ResultMessages:
         """Return the results of a judgement, which are published after the answer."""

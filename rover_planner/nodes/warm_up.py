@@ -18,13 +18,11 @@ from rover_planner.learning.drive_log import FORCES, TIME, WIDTH
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.search.difficulty import estimate_difficulty
-from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.edges import Edges, make_primitives
 from rover_planner.planning.search.graph import Seeds, ShortestPaths
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.path_search import find_path
-from rover_planner.planning.search.primitives import make_primitives
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.supervisor import TractionSupervisor

@@ -3,9 +3,8 @@
 
 from dataclasses import dataclass
 
-from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE, SIGMAS
 from rover_planner.maps.unobserved_ground import ALLOW, ALLOW_FOOTPRINT, REFUSE
 from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterTable, parameter

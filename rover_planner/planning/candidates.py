@@ -16,16 +16,18 @@ import numpy as np
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
-from rover_planner.planning.dubins import count_steps, dubins_paths
+from rover_planner.planning.path_geometry import (
+    MAX_WAYPOINTS,
+    count_steps,
+    dubins_paths,
+    path_length,
+)
 
 MIN_RADIUS = 0.8
 """Default smallest radius of a candidate [m]: the wheelbase of the LSR-1 preset.
 
 If the radius equals the wheelbase, the inner end wheels are steered by about 40 degrees.
 """
-
-MAX_WAYPOINTS = 100_000
-"""Longest path [waypoints]; a longer one is probably an error in the units of the request."""
 
 LEAST_TURN = 1e-3
 """Turn on the spot [rad] below which it is left out."""
@@ -112,11 +114,6 @@ def generate_candidates(
         path[0], path[-1] = start, goal  # without rounding errors
         path[:, 2] = wrap(path[:, 2])
     return paths
-
-
-def path_length(poses: np.ndarray) -> float:
-    """Return the length [m] of a path of poses (n, 3): the sum of its straight segments."""
-    return float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
 
 
 def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:

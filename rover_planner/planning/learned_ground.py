@@ -13,11 +13,9 @@ from rover_physics.files.validation import show_file
 from rover_physics.numerics.arrays import seal_array
 from rover_physics.numerics.plausible import MAX_FRICTION, MIN_FRICTION
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import MAX_DEVIATION
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-
-MOST_SPREAD = 0.35
-"""Largest relative standard deviation of friction that a rover file takes."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ class LearnedGround:
         if self.classes or not spreads:
             spreads.append(rover.uncertainty.friction)
         spread = max(spreads)
-        uncertainty = replace(rover.uncertainty, friction=min(spread, MOST_SPREAD))
+        uncertainty = replace(rover.uncertainty, friction=min(spread, MAX_DEVIATION))
         return replace(rover, friction=self.assume(rover.friction), uncertainty=uncertainty)
 
     def assume_classes(self, terrain: Terrain, told: float) -> dict[int, float]:

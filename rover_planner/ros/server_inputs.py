@@ -155,8 +155,7 @@ class ServerInputs:
 
     def keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
         """Keep a map in the service; return whether its content is new."""
-        frame = self.service.settings.parameters.map_frame
-        return self.service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
+        return self.service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources)
 
     def may_fill_under_rover(self) -> bool:
         """Return whether unknown ground under the rover is to be filled.

@@ -2,14 +2,16 @@
 """Computes the forces on a rover under given wheel torques: net push and use of friction."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
+from rover_physics.numerics.records import new_record
 from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.rover.linkage import PLACEMENT, place
 from rover_physics.traction.balance import LOADS, TRACTIONS, BalanceWriter, MeasuredState
 
 ROUNDS = 6
@@ -48,7 +50,7 @@ def find_driving_forces(
     """
     friction, loads, lateral = here.friction[0], here.wheel_loads[0], here.lateral[0]
     resistance = np.nan_to_num(here.motion_resistance[0])
-    state = measure_state(here, writer.on_bogie)
+    state = measure_state(here, writer.linkages[0])
     rolls = direction * writer.find_rolling(state).directions
     wanted = torques / radius - rolls * resistance
     push = 0.0
@@ -72,26 +74,19 @@ def find_driving_forces(
     return DrivingForces(push, utilisation, sliding)
 
 
-def measure_state(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> MeasuredState:
-    """Return the measured state of a rover at the waypoint, including its contacts.
-
-    `on_bogie` (6,) says which wheels hang on a bogie.
-    """
+def measure_state(here: PathPrediction, linkage: Any) -> MeasuredState:
+    """Return the measured state of a rover, a LINKAGE, at the waypoint with its contacts."""
     arms = here.contact_points[0] - here.wheel_centres[0]
     return MeasuredState(
         float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
         here.bogie_angle[0], here.contact_angle[0],
-        np.sum(arms * find_axles(here, on_bogie), axis=1), here.steering_angle[0],
+        np.sum(arms * find_axles(linkage, here), axis=1), here.steering_angle[0],
         here.wheel_loads[0],
     )  # fmt: skip
 
 
-def find_axles(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> Floats:
-    """Return the directions (6, 3) of the axles, positive to the left, map frame."""
-    yaw = float(here.poses[0, 2])
-    R = matrix_from_xyzw(xyzw_from_rpy(float(here.roll[0]), float(here.pitch[0]), yaw))
-    bogies = np.repeat(here.bogie_angle[0], 3)
-    links = np.repeat(here.rocker_angle[0], 3) + np.where(on_bogie, bogies, 0.0)
-    ahead = np.cos(links)[:, None] * R[:, 0] - np.sin(links)[:, None] * R[:, 2]
-    angles = here.steering_angle[0][:, None]
-    return np.asarray(np.cos(angles) * R[:, 1] - np.sin(angles) * ahead)
+def find_axles(linkage: Any, here: PathPrediction) -> Floats:
+    """Return the directions (6, 3) of the axles of a LINKAGE, positive to the left, map frame."""
+    placement = new_record(PLACEMENT, steering=here.steering_angle[0])
+    place(linkage, here.poses[0], here.results["q"][0], placement)
+    return np.asarray(placement.axis)

@@ -208,7 +208,8 @@ class QuasiStaticPlant:
 
     def _take_course(self) -> bool:
         """Note how the wheels roll; return False if this is another motion than before."""
-        self._rolling = self._writer.find_rolling(measure_state(self._here, self._writer.on_bogie))
+        state = measure_state(self._here, self._writer.linkages[0])
+        self._rolling = self._writer.find_rolling(state)
         return self._course.take(self._rolling, self._angles)
 
     def _watch_stall(self, duration: float) -> None:

@@ -4,6 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.chance.samples import cut_around
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 from rover_planner.angles import wrap
@@ -33,13 +34,11 @@ def look(
         TerrainError: No cell is in sight.
     """
     noise = asked.sensor_noise
-    rows, columns = _find_window(asked.sensor_range, terrain, position)
-    x0 = terrain.origin[0] + terrain.resolution * columns.start
-    y0 = terrain.origin[1] + terrain.resolution * rows.start
-    heights = terrain.elevation[rows, columns].copy()
+    part = cut_around(terrain, position[None, :2], asked.sensor_range)
+    heights = part.elevation.copy()
     y, x = np.indices(heights.shape)
-    dx = x0 + terrain.resolution * x - position[0]
-    dy = y0 + terrain.resolution * y - position[1]
+    dx = part.origin[0] + terrain.resolution * x - position[0]
+    dy = part.origin[1] + terrain.resolution * y - position[1]
     away = np.hypot(dx, dy)
     bearing = np.arctan2(dy, dx)
     seen = (away <= asked.sensor_range) & (away >= asked.sensor_least_range)
@@ -53,19 +52,7 @@ def look(
     if noise > 0.0:
         heights += rng.normal(0.0, noise, heights.shape)
         std = np.where(seen, noise, np.nan)
-    friction = None if terrain.friction is None else terrain.friction[rows, columns]
-    return Terrain(heights, terrain.resolution, (x0, y0), friction, elevation_std=std)
-
-
-def _find_window(reach: float, terrain: Terrain, position: Floats) -> tuple[slice, slice]:
-    """Return rows and columns of the cells within reach [m] of a position."""
-    ny, nx = terrain.elevation.shape
-    cells = int(np.ceil(reach / terrain.resolution))
-    column, row = (round((position[k] - terrain.origin[k]) / terrain.resolution) for k in (0, 1))
-    return (
-        slice(max(row - cells, 0), min(row + cells + 1, ny)),
-        slice(max(column - cells, 0), min(column + cells + 1, nx)),
-    )
+    return Terrain(heights, terrain.resolution, part.origin, part.friction, elevation_std=std)
 
 
 def _find_visible(

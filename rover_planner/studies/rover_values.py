@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from rover_physics.errors import RoverFileError
-from rover_physics.files.validation import Key, describe, errors_of, find_unit
+from rover_physics.files.validation import Key, describe, errors_of, find_rule
 from rover_physics.files.yaml_file import parse_yaml
 from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.rover.model import Rover
@@ -51,7 +51,7 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
 
     def amount(label: str, unit: str, *key: str | int, top: float = 0.0) -> RoverValue:
         now = get_value(data, key)
-        return _make_value((key,), f"{label} [{unit}]", now, 0.2 * now, max(2.5 * now, top))
+        return _make_value((key,), f"{label} [{unit}]", now, 0.2 * now, max(2.5 * now, top) or 1.0)
 
     height = length("wheels z", "suspension", "wheels", "rear", 2, within=1.5 * radius)
     all_wheels = tuple(("suspension", "wheels", name, 2) for name in WHEEL_POSITIONS)
@@ -116,7 +116,7 @@ def find_key(contents: Mapping[str, Any], name: str) -> tuple[Key, str]:
         raise RoverFileError(
             f"the rover has no number {describe(name)}; it has {', '.join(near)}, ..."
         )
-    return known[name], find_unit(Rover, known[name])
+    return known[name], find_rule(Rover, known[name]).unit
 
 
 def _list_keys(contents: Any, name: str = "", key: Key = ()) -> Iterator[tuple[str, Key]]:

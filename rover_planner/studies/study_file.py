@@ -15,6 +15,7 @@ from rover_physics.files.config_files import find_config
 from rover_physics.files.rules import ListOfMappings, Metres, Radians, Rule, Text, choice, number
 from rover_physics.files.validation import Key, errors_of, read_as, refuse, show_file
 from rover_physics.files.yaml_file import read_yaml
+from rover_physics.names import CONTROL_POLICIES, EQUAL
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, rover_to_dict
 from rover_physics.terrain.soil_file import soil_named
@@ -124,7 +125,7 @@ class StudyOptions:
     """One of OBJECTIVES."""
     method: Annotated[str, choice("sweep", "optimise")] = "sweep"
     """A sweep tries all combinations of the parameters; an optimisation searches the best one."""
-    policy: Annotated[str, choice("equal", "optimal")] = "equal"
+    policy: Annotated[str, choice(*CONTROL_POLICIES)] = EQUAL
     """Torque policy: the shares of the wheels in the traction."""
     friction: Annotated[float, number("", above=0.0)] | None = None
     """Coulomb friction; None takes that of the rover."""

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.prediction.map_sweep import SCORES
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_physics.traversability.pose_classes import IMPASSABLE
-from rover_physics.traversability.verdict import codes_of_verdicts
+from rover_physics.traversability.verdict import WORSE, codes_of_verdicts
 from rover_planner.survey.layout import Index
 
 NOT_SURVEYED = 255
@@ -26,15 +27,8 @@ UNKNOWN_LABEL = "unknown ground, edge, or not surveyed"
 MAX_DRAWN = 1200
 """Most cells along a side that are drawn; of more, every second, third, ..."""
 
-QUANTITIES = {
-    "friction_utilisation": (0, True),
-    "torque_saturation": (1, True),
-    "tip_over_ratio": (3, False),
-    "tilt": (4, True),
-    "belly_clearance": (5, False),
-}
-"""Numbers of a pose whose worst and best value over the headings are kept: the row in a score of
-`map_sweep`, and whether the worst value is the largest."""
+QUANTITIES = tuple(name for name in SCORES if name in WORSE)
+"""Numbers in a score of `map_sweep` whose worst and best value over the headings are kept."""
 
 
 def number_limits() -> dict[str, int]:

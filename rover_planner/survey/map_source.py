@@ -16,13 +16,12 @@ import numpy as np
 from rover_physics.files.validation import show_file
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.layers import GRID_LAYERS
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layout import Box, Index
 
 MAP = "map"
 """Group of a store that holds the map, where it comes from an .npz file."""
-GRIDS = ("elevation", "friction", "soil", "elevation_std")
-"""Layers of a map that predictions use, named as the fields of a Terrain."""
 MAP_CHUNK = 512
 """Side of the chunks in which a map is kept [cells]."""
 SUFFIXES = (".tif", ".tiff")
@@ -72,13 +71,13 @@ class StoredMap:
     def read(self, box: Box, every: int = 1) -> Grids:
         """Return the layers in a box of cells, every so many cells of them."""
         thin = tuple(slice(span.start, span.stop, every) for span in box)
-        return {name: self.group[name][thin] for name in GRIDS if name in self.group}
+        return {name: self.group[name][thin] for name in GRID_LAYERS if name in self.group}
 
 
 def keep_map(group: Any, terrain: Terrain) -> None:
     """Write a terrain into a Zarr group, for `StoredMap`."""
     kept = group.create_group(MAP)
-    for name in GRIDS:
+    for name in GRID_LAYERS:
         grid = getattr(terrain, name)
         if grid is not None:
             chunks = tuple(min(MAP_CHUNK, size) for size in grid.shape)

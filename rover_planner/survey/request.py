@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 import rover_physics
-from rover_physics.bounds.path import SIGMAS, check_sigmas
+from rover_physics.bounds.path import check_sigmas
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import SIGMAS
 from rover_planner.errors import PlanningError
 
 MAX_HEADINGS = 64

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The survey of one tile: the rover at each of its cells and headings, and what is kept of it."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.map_sweep import find_scores
+from rover_physics.prediction.map_sweep import SCORES, find_scores
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.results.uses import find_codes
@@ -24,6 +23,7 @@ from rover_physics.traversability.pose_classes import (
     classify_poses,
     hopeless_codes,
 )
+from rover_physics.traversability.verdict import WORSE
 from rover_planner.survey.layers import (
     NO_LIMIT,
     QUANTITIES,
@@ -207,7 +207,7 @@ def _sum_up(
     """Return the layers of cells from the numbers of their poses, all headings of a cell in turn.
 
     Args:
-        numbers: (SCORE_ROWS, n) scores of `map_sweep`.
+        numbers: (k, n) SCORES of `map_sweep`.
         limits: (n,) numbers of limits.
         classes: (n,) numbers of classes.
         headings: Number of headings.
@@ -222,12 +222,11 @@ def _sum_up(
         "first_limit": np.where(passes.all(axis=1), np.uint8(NO_LIMIT), first),
         "passable_headings": pack_bits(passes),
     }
-    for name, (row, high_is_bad) in QUANTITIES.items():
-        values = numbers[row].reshape(-1, headings)
-        ends: tuple[Callable[..., Any], Callable[..., Any]] = np.fmax.reduce, np.fmin.reduce
-        worst, best = ends if high_is_bad else ends[::-1]
-        layers[f"worst_{name}"] = worst(values, axis=1)
-        layers[f"best_{name}"] = best(values, axis=1)
+    for name in QUANTITIES:
+        values = numbers[SCORES.index(name)].reshape(-1, headings)
+        best = np.fmin if WORSE[name] is np.fmax else np.fmax
+        layers[f"worst_{name}"] = WORSE[name].reduce(values, axis=1)
+        layers[f"best_{name}"] = best.reduce(values, axis=1)
     return layers
 
 

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from rover_physics import judge_path
+from rover_physics.numerics.interruption import interruptible
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice import seek
-from rover_planner.advice.advise import STOPPED, Advice, grow_advice, grow_within, path_of
+from rover_planner.advice.advise import STOPPED, Advice, grow_advice, path_of
 from rover_planner.advice.case import SEARCH, Case, case_of
 from rover_planner.advice.levers import LEVERS, Choice
 from rover_planner.advice.path_changes import bend_path
@@ -22,7 +23,7 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.marked_places import MARKED_CODE, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from support.grounds import enlarged, make_terrain, rock_left
 from support.rovers import FIXED, LSR1, M2020, similar
 
@@ -156,12 +157,14 @@ def test_what_was_not_tried_in_time_is_told():
         if len(told) == 3:
             raise QuestionStoppedError("too_long", "the time is over")
 
-    for advice in grow_within(refused_by(wall), check):
-        told.append(advice)
+    with interruptible(check):
+        for advice in grow_advice(refused_by(wall)):
+            told.append(advice)
     assert len(told) == 3 and told[-1].tried and not told[-1].found and not told[-1].complete
     assert told[-1].describe() == "no lever that was tried in time helps"
-    with pytest.raises(QuestionStoppedError, match=f"^{STOPPED}$"):  # not even the path is judged
-        list(grow_within(refused_by(wall), check))
+    # Not even the path is judged.
+    with interruptible(check), pytest.raises(QuestionStoppedError, match=f"^{STOPPED}$"):
+        list(grow_advice(refused_by(wall)))
 
 
 @pytest.mark.parametrize("rover", [LSR1, M2020, FIXED], ids=["lsr1", "m2020", "fixed"])

@@ -13,8 +13,7 @@ from rover_planner.figures.path_pictures import _draw_uses, draw_path
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.rovers import LSR1

@@ -10,7 +10,7 @@ import pytest
 
 from rover_planner.nodes import warm_up
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from support.grounds import plane
 from support.project.without_disk import fill_disk
 from support.rovers import LSR1

@@ -39,8 +39,8 @@ class Drive:
         """Give the server the map that the camera sees now."""
         state = self.simulation.plant.state()
         attitude = rpy_from_xyzw(tuple(state.orientation.tolist()))
-        suspension = {name: state.joint_positions[name] for name in SUSPENSION_JOINTS}
-        standing = Standing(*state.position.tolist(), *attitude, suspension)
+        suspension = np.array([state.joint_positions[name] for name in SUSPENSION_JOINTS])
+        standing = Standing(np.array([*state.position, *attitude]), suspension)
         seen = self.simulation.look(state.position, attitude[2])
         now = self.keeper.take(seen, "elevation_cloud", self.time, standing)
         self.service.take_terrain(now.terrain, "elevation_cloud", None, now.sources)
@@ -61,7 +61,7 @@ def test_the_first_drive_is_accepted_and_reaches_its_goal():
         drive.look()
         # What was seen stays: the path is still passable where the camera does not look.
         drive.service.given_path = GivenPath(path, "")
-        assert drive.service.snapshot().check_path().traversable
+        assert drive.service.given_path.judge(drive.service.snapshot()).traversable
     assert np.hypot(*(drive.simulation.plant.pose() - GOAL)[:2]) < 0.1
     names = drive.service.known_map.cells.count()
     assert names["elevation_cloud"] > 0 and names["footprint"] > 0 and names["contact"] > 0
@@ -77,7 +77,7 @@ def test_blind_ground_is_refused_where_the_parameter_says_so():
     drive = Drive(footprint_margin=MARGIN, blind_ground="refuse")
     refused = drive.service.snapshot().answer(START, GOAL)
     assert refused.code == "blind_ground" and not refused.traversable
-    report = refused.report.to_dict()
+    report = refused.report
     assert "never seen" in refused.reason and report["first_failure"] == 0
     assert report["traversability_class"] == "passable"
     assert f"{100.0 * refused.ground.unobserved_share:.1f} %" in refused.reason

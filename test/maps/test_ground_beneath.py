@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from rover_physics import judge_path
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.parameters.traverse_server import TraverseServerParameters
@@ -21,10 +20,9 @@ def standing_at(rover, terrain, pose):
     """Return what a rover that stands at a pose measures, from the model."""
     there = judge_path(rover, terrain, np.array([pose]))[0]
     assert there.settled[0]
-    angles = (*there.rocker_angle[0], *there.bogie_angle[0])
-    attitude = float(there.roll[0]), float(there.pitch[0]), pose[2]
-    suspension = dict(zip(SUSPENSION_JOINTS, map(float, angles), strict=True))
-    return Standing(*there.position[0].tolist(), *attitude, suspension), there
+    angles = np.array([*there.rocker_angle[0], *there.bogie_angle[0]])
+    attitude = there.roll[0], there.pitch[0], pose[2]
+    return Standing(np.array([*there.position[0], *attitude]), angles), there
 
 
 @pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)

@@ -8,7 +8,7 @@ import pytest
 
 from rover_planner.planning.path_query import PathQueryOptions, choose, generate_paths
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from support.grounds import make_terrain, rocky
 from support.rovers import LSR1
 

@@ -8,8 +8,7 @@ from rover_physics.rover.model import Rover
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import find_path
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 from support.grounds import bouldered, enlarged, rocky, scaled_for
 from support.rovers import LSR1, M2020, SIMILAR, similar
 from support.services import load_settings

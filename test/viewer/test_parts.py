@@ -12,7 +12,7 @@ import pytest
 
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.traversability.judge import judge_path, judge_poses
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from rover_planner.viewer.state import colours, layers
 from rover_planner.viewer.state.background_work import Inbox
 from rover_planner.viewer.state.drive import Playback, Trajectory

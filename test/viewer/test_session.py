@@ -13,7 +13,7 @@ from rover_physics.traversability.judge import judge_path
 from rover_planner.command.prediction_files import read_prediction, write_prediction
 from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import assume
+from rover_planner.planning.path_query import assume
 from rover_planner.viewer.documents.paths import describe_changes, describe_paths, describe_verdict
 from rover_planner.viewer.state.scenario import CANDIDATES
 from support.grounds import make_terrain, wall_at, waves, with_std

@@ -21,6 +21,10 @@ DIRECTIONS = ("x", "-x", "y", "-y", "z", "-z")
 Direction = Annotated[str, choice(*DIRECTIONS)]
 ARM_TIP = "arm_tip"
 """Name of the link at the tip of a written rover's arm."""
+OF_URDF = ("name", "suspension", "masses", "belly", "steering", "manipulator")
+"""Keys of a rover file that a URDF gives; a written map has all others."""
+WHEEL_OF_URDF = ("radius", "width", "mass", "max_torque", "max_speed")
+"""Keys of a wheel that it gives."""
 
 
 @dataclass(frozen=True)
@@ -96,11 +100,8 @@ def load_joint_map(path: Path) -> UrdfJointMap:
 
 def map_of(rover: Rover) -> dict[str, Any]:
     """Return the contents of the map that reads a rover back from the URDF of `write_urdf`."""
-    contents = rover_to_dict(rover)
-    given = ("gravity", "friction", "nominal_speed", "limits", "uncertainty")
-    rest: dict[str, Any] = {key: contents[key] for key in given}
-    drive, wheel = ("servo_droop", "torque_per_current"), contents["wheel"]
-    rest["wheel"] = {key: wheel[key] for key in drive if key in wheel}
+    rest = {key: value for key, value in rover_to_dict(rover).items() if key not in OF_URDF}
+    rest["wheel"] = {key: rest["wheel"][key] for key in rest["wheel"] if key not in WHEEL_OF_URDF}
     joints: dict[str, Any] = {
         "rocker": {side: f"rocker_{side}" for side in SIDES},
         "bogie": {side: f"bogie_{side}" for side in SIDES},

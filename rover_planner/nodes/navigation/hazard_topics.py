@@ -207,4 +207,5 @@ class _Shown:
             classes = view.worst() if name == "worst" else view.best()
         else:
             classes = view.classes[int(name.removeprefix("heading_"))]
-        return occupancy_grid(VALUES[classes], view.resolution, view.origin, self.header)
+        grid = view.grid
+        return occupancy_grid(VALUES[classes], grid.resolution, grid.anchor, self.header)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import EQUAL
-from rover_physics.numerics.plain_values import to_plain
 from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
 from rover_physics.traversability.verdict import BOUND_EXTREMES, EXTREMES
 from rover_planner.maps.unobserved_ground import UnobservedShare
@@ -19,10 +18,21 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_query import Candidate, PathAnswer
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 
 REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUND_EXTREMES, "failure_chance")
 """Fields of a verdict that a report has."""
+PER_WAYPOINT = (
+    "codes",
+    "reasons",
+    "failure_chance_at",
+    "traversability_classes",
+    "class_constraints",
+    "class_wheels",
+    "class_margins",
+)
+"""Keys of a report whose values are lists with a value for each waypoint. If there was no time for
+the waypoints beyond the first failure, they are without them."""
 TOLD, LEARNED = "told", "learned"
 """Source of the friction of a question."""
 
@@ -74,34 +84,6 @@ class IdentityReport:
     empty unless a learned one is assumed and the map has classes."""
 
 
-@dataclass(frozen=True)
-class VerdictReport:
-    """The answer to a request with all its details; docs/traverse_server.md explains its keys."""
-
-    entries: Mapping[str, Any]
-    """Verdict, code and reason; the judged path, if there is one, and the search for it."""
-    per_waypoint: Mapping[str, Sequence[Any]] = field(default_factory=dict)
-    """Verdict and class of each waypoint. If there was no time for the waypoints beyond the first
-    failure, the lists are without them."""
-    identity: IdentityReport | None = None
-    """Its question, path and map; None if it was not asked for over ROS."""
-
-    @property
-    def has_warning(self) -> bool:
-        """True if the measured suspension disagrees with the prediction."""
-        return not self.entries.get("suspension_agrees", True)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return all entries in JSON types: one level, None for NaN and infinity."""
-        return self.summary() | to_plain(dict(self.per_waypoint))
-
-    def summary(self) -> dict[str, Any]:
-        """Return the entries of `to_dict` without those that have a value per waypoint."""
-        about = {} if self.identity is None else asdict(self.identity)
-        plain: dict[str, Any] = to_plain({**self.entries, **about})
-        return plain
-
-
 @dataclass(frozen=True, eq=False)
 class PathJudgement:
     """A judged path, or a refusal before any path was judged."""
@@ -142,22 +124,16 @@ class PathJudgement:
         If there is no time for the waypoints beyond the first failure, or for classes, the
         judgement is without them.
         """
-        whole = self
+        whole, candidate, site = self, self.candidate, self.site
         try:
-            whole = self._with_rest()
+            if candidate and site and not (candidate.is_complete or self.is_brief):
+                whole = replace(self, candidate=PathJudge(site).check(candidate.poses))
             if not whole._is_equal_and_traversable:
                 _ = whole.classes
             _ = whole.ground
         except QuestionStoppedError:
             return replace(whole, is_brief=True)
         return whole
-
-    def _with_rest(self) -> "PathJudgement":
-        """Return the judgement with the waypoints beyond the first failure."""
-        candidate, site = self.candidate, self.site
-        if candidate is None or site is None or candidate.is_complete or self.is_brief:
-            return self
-        return replace(self, candidate=PathJudge(site).check(candidate.poses))
 
     @property
     def _is_equal_and_traversable(self) -> bool:
@@ -166,13 +142,20 @@ class PathJudgement:
         return candidate is not None and self.traversable and candidate.verdict.policy == EQUAL
 
     @cached_property
-    def report(self) -> VerdictReport:
-        """The full report of the request. Computed on first use, with the classes and the rest."""
-        whole = self._with_rest()
-        entries = {"traversable": self.traversable, "code": self.code, "reason": self.reason}
+    def report(self) -> dict[str, Any]:
+        """The full report of the request; docs/traverse_server.md explains its keys.
+
+        Computed on first use, with the classes and the rest.
+        """
+        whole = self.complete()
+        entries: dict[str, Any] = {
+            "traversable": self.traversable,
+            "code": self.code,
+            "reason": self.reason,
+        }
         candidate, classes, ground = whole.candidate, whole.classes, whole.ground
         if candidate is None:
-            return VerdictReport({**entries, "first_failure": -1})
+            return {**entries, "first_failure": -1}
         entries |= _report_drive(candidate)
         if classes:
             entries |= _report_class(classes)
@@ -184,18 +167,16 @@ class PathJudgement:
         if self.search is not None:
             entries |= _report_search(self.search)
         verdict = candidate.verdict
-        return VerdictReport(
-            entries,
-            {
-                "codes": verdict.codes,
-                "reasons": verdict.reasons,
-                "failure_chance_at": verdict.failure_chance_at or [math.nan] * len(verdict.codes),
-                "traversability_classes": [one.traversability_class for one in classes],
-                "class_constraints": [one.constraint for one in classes],
-                "class_wheels": [one.wheel for one in classes],
-                "class_margins": [one.margin for one in classes],
-            },
+        lists = (
+            verdict.codes,
+            verdict.reasons,
+            verdict.failure_chance_at or [math.nan] * len(verdict.codes),
+            [one.traversability_class for one in classes],
+            [one.constraint for one in classes],
+            [one.wheel for one in classes],
+            [one.margin for one in classes],
         )
+        return entries | dict(zip(PER_WAYPOINT, lists, strict=True))
 
     @cached_property
     def ground(self) -> UnobservedShare | None:

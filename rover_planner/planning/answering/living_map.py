@@ -13,6 +13,7 @@ import numpy as np
 
 from rover_physics.numerics.arrays import seal_array
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.layers import GRID_LAYERS
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
 from rover_planner.maps.layers import (
@@ -20,7 +21,6 @@ from rover_planner.maps.layers import (
     FIRST_NAMES,
     FOOTPRINT,
     LASTING,
-    LAYERS,
     LOADED,
     UNKNOWN,
     CellSources,
@@ -172,7 +172,7 @@ class LivingMap:
         for layer in layers.values():
             seal_array(layer)
         if self._whole is None:
-            grids: dict[str, Any] = {name: layers[name] for name in LAYERS if name in layers}
+            grids: dict[str, Any] = {name: layers[name] for name in GRID_LAYERS if name in layers}
             if self.loaded is not None and "soil" in layers:
                 grids["soil_names"] = self.loaded.soil_names
             origin = self.grid.places(box.column, box.row)

@@ -66,7 +66,7 @@ class MapKeeper:
         """
         content = "" if self.merges else terrain.fingerprint
         if self.merges:
-            centre = None if standing is None else (standing.x, standing.y)
+            centre = None if standing is None else (standing.pose[0], standing.pose[1])
             self._living.merge(terrain, source, time, centre)
         elif content != self._taken:
             self._living.replace(terrain, source, time)

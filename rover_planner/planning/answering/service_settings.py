@@ -15,9 +15,8 @@ from rover_planner.parameters.traverse_server import (
     USE,
     TraverseServerParameters,
 )
-from rover_planner.planning.assumptions import assume
 from rover_planner.planning.learned_ground import LearnedGround
-from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.path_query import PathQueryOptions, assume
 from rover_planner.planning.search.query import LatticeSettings
 
 MONITOR_OFFSET = 5.0

@@ -2,8 +2,11 @@
 """All that a traverse server knows when a question is asked, and the answers from it."""
 
 import math
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +19,6 @@ from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import PathJudgement, SuspensionReport, refusal
-from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
@@ -26,10 +28,70 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.lattice_search import SearchProgress
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
-from rover_planner.planning.search.query import SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import SearchQuery, Site
 
 NO_PATH = "no path was received yet; publish one on ~/path"
+REPORT_PERIOD = 0.2
+"""Least time between two reports of a search [s]."""
+
+
+class NewerMapError(Exception):
+    """The map has changed while a path was searched on it."""
+
+
+class SearchWatch:
+    """Watches the searches of one question.
+
+    The question is to be answered again after a NewerMapError: what is known of unchanged ground
+    is remembered. After `patience` a changed map no longer ends the search, so that maps that
+    change all the time do not keep the question from its answer.
+    """
+
+    def __init__(
+        self,
+        newest_map: Callable[[], KnownMap | None],
+        send_report: Callable[[dict[str, Any]], object],
+        patience: float,
+    ):
+        """Watch the searches of a question.
+
+        Args:
+            newest_map: Returns the newest map.
+            send_report: Takes a report, in the thread of the search: True if a path is `found`,
+                its `cost` (infinite without one) and the `bound` from below on that of any path of
+                the lattice (0 while it is not known) in metres of level ground, the number of
+                `edges_judged`, and the `seconds` since the question's first search began.
+            patience: Time from the first search on in which a changed map ends a search [s].
+        """
+        self._newest_map, self._send_report, self._patience = newest_map, send_report, patience
+        self._began: float | None = None
+        self._sent_at = 0.0
+
+    def look(self, searched: KnownMap, progress: SearchProgress) -> None:
+        """Report how far the search on a map is.
+
+        Raises:
+            NewerMapError: The map has changed.
+        """
+        now = time.monotonic()
+        if self._began is None:
+            self._began = now
+        seconds = now - self._began
+        if now - self._sent_at >= REPORT_PERIOD:
+            self._sent_at = now
+            self._send_report(
+                {
+                    "found": progress.best is not None,
+                    "cost": progress.cost,
+                    "bound": progress.least_cost,
+                    "edges_judged": progress.judged,
+                    "seconds": seconds,
+                }
+            )
+        newest = self._newest_map()
+        has_changed = newest is not None and newest.fingerprint != searched.fingerprint
+        if has_changed and seconds < self._patience:
+            raise NewerMapError("the map has changed while a path was searched on it")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +111,9 @@ class GivenPath:
 
     def judge(self, snapshot: "Snapshot") -> PathJudgement:
         """Judge whether the rover can drive it; errors are those of `Snapshot.check_path`."""
-        return replace(snapshot, path=self).check_path().complete()
+        if self.poses is None:
+            return refusal(self.code, self.refusal)
+        return snapshot.check_path(self.poses).complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +203,9 @@ class Snapshot:
             query: The query.
             refused: The judgement on the candidates; None if none were tried.
         """
-        found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
+        assert self.known_map is not None
+        look = None if self.watch is None else partial(self.watch.look, self.known_map)
+        found = find_path(query, self.settings.lattice, self.edge_memory, look)
         if found.path is not None:
             before = None if refused is None else refused.search
             search = add_path(before, found.path, np.asarray(query.goal))
@@ -153,32 +219,22 @@ class Snapshot:
         reason = f"{why}; the best candidate: {refused.reason}"
         return replace(refused, code=code, reason=reason, around=found)
 
-    def _look(self, progress: SearchProgress) -> None:
-        """Let the watch look at a search."""
-        if self.watch is not None and self.known_map is not None:
-            self.watch.look(self.known_map, progress)
-
-    def check_path(self, *, stop_at_failure: bool = False) -> PathJudgement:
-        """Judge the last path, if wanted only up to its first failure.
+    def check_path(
+        self, poses: NDArray[np.float64], *, stop_at_failure: bool = False
+    ) -> PathJudgement:
+        """Judge a path of poses (n, 3), if wanted only up to its first failure.
 
         Raises:
             PlanningError: The path is too long.
             RoverError: The model refuses the path.
         """
-        missing = self.refuse_if_missing()
-        if missing is not None:
-            return missing
-        assert self.path.poses is not None
+        refused = self.refuse_map()
+        if refused is not None:
+            return refused
         site = self._site()
-        poses, _ = densify(self.path.poses, site.options.waypoint_spacing)
-        path = PathJudge(site).check(poses, stop_at_failure=stop_at_failure)
+        waypoints, _ = densify(poses, site.options.waypoint_spacing)
+        path = PathJudge(site).check(waypoints, stop_at_failure=stop_at_failure)
         return self._describe(site, path)
-
-    def refuse_if_missing(self) -> PathJudgement | None:
-        """Return a refusal if there is no path or no map to use, else None."""
-        if self.path.poses is None:
-            return refusal(self.path.code, self.path.refusal)
-        return self.refuse_map()
 
     def refuse_map(self) -> PathJudgement | None:
         """Return a refusal if there is no map, or if it is too old, else None."""

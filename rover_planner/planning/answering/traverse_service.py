@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.arrays import Floats
@@ -92,14 +94,13 @@ class TraverseService:
         pose, tilt, joints = self._pose, self._tilt, self._joints
         if pose is None or not joints.keys() >= set(SUSPENSION_JOINTS):
             return None
-        suspension = {name: joints[name] for name in SUSPENSION_JOINTS}
-        if not self._is_recent(pose, tilt or pose, *suspension.values()):
+        angles = [joints[name] for name in SUSPENSION_JOINTS]
+        if not self._is_recent(pose, tilt or pose, *angles):
             return None
-        x, y, z, roll, pitch, yaw = pose.value.tolist()
+        measured = np.array(pose.value)
         if tilt is not None:
-            roll, pitch = tilt.value
-        angles = {name: angle.value for name, angle in suspension.items()}
-        return Standing(x, y, z, roll, pitch, yaw, angles)
+            measured[3:5] = tilt.value
+        return Standing(measured, np.array([angle.value for angle in angles]))
 
     def fresh_pose(self, max_age: float = MAX_AGE) -> Floats | None:
         """Return the pose (3,) x, y [m], yaw [rad] if it is not older than `max_age` [s]."""
@@ -119,7 +120,6 @@ class TraverseService:
         source: str = "",
         stamp: int | None = None,
         cells: CellSources | None = None,
-        frame: str = "",
     ) -> bool:
         """Keep a map until the next one; return whether its content is new.
 
@@ -128,10 +128,8 @@ class TraverseService:
             source: Topic or file it comes from.
             stamp: Stamp of its header [ns, ROS time]; None if it has none.
             cells: Where its cells come from; None if that is `source` for all.
-            frame: Frame of the map; empty if it has none.
         """
-        about = KnownMap(terrain, terrain, source, stamp, self._clock(), cells, frame)
-        return self._keep_map(about)
+        return self._keep_map(KnownMap(terrain, terrain, source, stamp, self._clock(), cells))
 
     def amend_map(self, terrain: Terrain, cells: CellSources) -> None:
         """Keep a map with more known cells than the present one, of the same age."""

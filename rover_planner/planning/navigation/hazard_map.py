@@ -18,7 +18,7 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
-from rover_planner.maps.cells import grid_of
+from rover_planner.maps.cells import CellGrid, grid_of
 from rover_planner.maps.layers import Shift, find_changes, find_overlap, have_same_layers
 
 TILE = 32
@@ -38,10 +38,8 @@ class HazardView:
 
     classes: NDArray[np.int8]
     """(headings, ny, nx) class of each heading and cell; UNKNOWN where it is not judged yet."""
-    resolution: float
-    """Cell size [m]."""
-    origin: tuple[float, float]
-    """x, y of the centre of cell [0, 0] [m], map frame."""
+    grid: CellGrid
+    """The cells."""
 
     def worst(self) -> NDArray[np.int8]:
         """Return (ny, nx) the worst class; IMPASSABLE is worse than UNKNOWN, all else better."""
@@ -119,10 +117,8 @@ class HazardMap:
         """Return the classes of now; None before the first map."""
         if self._on_map is None:
             return None
-        terrain = self._on_map.terrain
         classes = np.where(self._stale, np.int8(UNKNOWN), self._classes)
-        x, y = terrain.origin
-        return HazardView(classes, float(terrain.resolution), (float(x), float(y)))
+        return HazardView(classes, grid_of(self._on_map.terrain))
 
     def _batches(
         self, terrain: Terrain, near: tuple[float, float] | None

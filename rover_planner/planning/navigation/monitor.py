@@ -15,7 +15,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
-from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.marked_places import MarkedPlaces
 from rover_planner.planning.navigation.watched_path import Place, WatchedPath
 
@@ -225,14 +225,10 @@ class PathMonitor:
             cut = _cut_map(snapshot, ahead)
             is_exact = cut.terrain is None or cut.terrain.elevation_std is None
             for known in (cut,) if is_exact else (_take_as_exact(cut), cut):
-                judgement = _check(known, ahead)
+                judgement = known.check_path(ahead, stop_at_failure=True)
                 if not judgement.traversable:
                     return judgement
-        return _check(snapshot, path.poses[first:])
-
-
-def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
-    return replace(snapshot, path=GivenPath(poses, "")).check_path(stop_at_failure=True)
+        return snapshot.check_path(path.poses[first:], stop_at_failure=True)
 
 
 def _take_as_exact(snapshot: Snapshot) -> Snapshot:

@@ -14,11 +14,11 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.angles import wrap
 from rover_planner.planning.candidates import turn_and_drive
-from rover_planner.planning.dubins import dubins_lengths, shortest_dubins_path
+from rover_planner.planning.path_geometry import dubins_lengths, shortest_dubins_path
 from rover_planner.planning.path_query import Pose
+from rover_planner.planning.search.edges import PRICES, Gear, Piece
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nearest_heading
-from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 
 MAX_DISTANCE = 3.0
 """Distance within which nodes are looked for, unless the rover turns too widely for it [cells]."""

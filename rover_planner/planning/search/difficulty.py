@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates how likely the model refuses an edge, from the steepness below the wheels.
+"""Estimates from the map how likely the model refuses an edge, and finds nodes without ground.
 
 The ground is taken as the wheels feel it: the surface on which the lowest points of spheres with
 the wheel's radius move. An edge is the more likely refused, the steeper that surface is below all
@@ -9,19 +9,22 @@ as steep. The estimate orders the questions to the model and decides nothing.
 
 import math
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import exact_kernel
+from rover_physics.rover.linkage import pack_linkage
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.angles import wrap
-from rover_planner.planning.search.ground_estimate import wheel_places
+from rover_planner.planning.search.edges import Primitive
 from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
-from rover_planner.planning.search.primitives import Primitive
 
 SHARE = 0.25
 """Distance of the places that are looked at [cells of the lattice], at least one of the map."""
@@ -39,6 +42,8 @@ LEAST_DIFFICULTY = 0.5 / STEPS_PER_UNIT
 """Difficulty of level ground."""
 NOT_LOOKED = 255
 """Difficulty of a place that was not looked at."""
+BETWEEN_CELLS = 1.5
+"""Distance [cells] that a place on known ground may seem to be from known cells."""
 _AHEAD = np.column_stack([np.cos(YAWS), np.sin(YAWS)])
 """(HEADINGS, 2) unit vectors along the headings."""
 
@@ -207,3 +212,64 @@ def _look_at(difficulty, heading, j, i):
         most = max(most, abs(_AHEAD[heading, 0] * x + _AHEAD[heading, 1] * y))
     logit = LEVEL + (ALL_WHEELS * steepness / 6.0 + ONE_WHEEL * most) / difficulty.climb
     return np.uint8(min(STEPS_PER_UNIT * math.log1p(math.exp(min(logit, 8.0))), 254.0))
+
+
+def find_groundless(rover: Rover, terrain: Terrain, nodes: Nodes) -> NDArray[np.bool_]:
+    """Return (nodes,) whether a wheel is over unknown ground however the rover tilts.
+
+    The model refuses these, and some more.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        nodes: The nodes.
+    """
+    groundless = np.zeros((nodes.count // HEADINGS, HEADINGS), bool)
+    unknown = np.isnan(terrain.elevation)
+    if not unknown.any():
+        return groundless.ravel()
+    away, last = ndimage.distance_transform_edt(unknown), np.array(unknown.shape[::-1]) - 1
+
+    def from_known(places: Floats) -> Floats:
+        """Return bounds (n,) from below on the distances of places to known cells, in cells."""
+        column, row = np.clip(np.rint(places), 0, last).astype(int).T
+        return np.asarray(away[row, column])
+
+    at = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
+    at = (at - terrain.origin) / terrain.resolution
+    shift = largest_wheel_shift(rover) / terrain.resolution + BETWEEN_CELLS
+    reach = swing_radius(rover) / terrain.resolution + BETWEEN_CELLS
+    far = np.flatnonzero(from_known(at) > shift - reach)
+    for heading, wheels in enumerate(wheel_places(rover) / terrain.resolution):
+        for wheel in wheels:
+            groundless[far, heading] |= from_known(at[far] + wheel) > shift
+    return groundless.ravel()
+
+
+def wheel_places(rover: Rover) -> NDArray[np.float64]:
+    """Return (HEADINGS, 6, 2) x, y [m] of the wheel centres at a node at the origin, level."""
+    places = pack_linkage(rover).wheels
+    c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
+    x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
+    return np.stack([x, y], axis=-1)
+
+
+def largest_wheel_shift(rover: Rover) -> float:
+    """Return how far a wheel centre is at most from its place on level ground [m].
+
+    Each link turns by no more than the limits of body, rocker and bogie together.
+    """
+    suspension = rover.suspension
+    rocking, turning = (
+        max(map(abs, limits)) for limits in (suspension.rocker_limits, suspension.bogie_limits)
+    )
+    angles = np.minimum(np.cumsum([rover.limits.tilt, rocking, turning]), math.pi)
+    farthest = 0.0
+    for name, wheel in suspension.wheels.items():
+        joints = [(0.0, 0.0, 0.0), suspension.rocker_pivot, wheel]
+        if name in suspension.bogie_wheels:
+            joints.insert(2, suspension.bogie_pivot)
+        links = (math.dist(*ends) for ends in pairwise(joints))
+        chords = (2.0 * k * math.sin(0.5 * a) for k, a in zip(links, angles, strict=False))
+        farthest = max(farthest, sum(chords))
+    return farthest

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Remembers judged edges and the last path, from one search to the next."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.known_poses import KnownPoses
@@ -14,19 +15,14 @@ from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.layers import find_changes, have_same_layers
-from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.edges import Edges, Piece, make_primitives
+from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
-from rover_planner.planning.search.primitives import Piece, make_primitives
-from rover_planner.planning.search.query import SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import SearchQuery, Site
 
 MARGIN = BLOCK + 1
 """Distance from wheels and body within which ground counts for a pose [cells]: the kernels look at
 the blocks of cells that these touch, however they are turned, and at the cells around them."""
-
-PosesByModel = tuple[KnownPoses, KnownPoses]
-"""What is known of poses of whole paths, and of the pieces that a search asks about in numbers,
-with other options if the chance of failure counts."""
 
 
 class EdgeMemory:
@@ -38,34 +34,45 @@ class EdgeMemory:
     """
 
     def __init__(self) -> None:
-        self._site: Site | None = None
+        self._judge: PathJudge | None = None
+        """The model at the site of the last search."""
         self._edges: Edges | None = None
-        self._poses: PosesByModel | None = None
         self._query: SearchQuery | None = None
         self._pieces: list[Piece] = []
 
-    def begin(self, site: Site) -> PosesByModel:
+    def begin(self, site: Site) -> PathJudge:
         """Forget what does not hold at the site of the next search.
 
-        Returns what is known of poses of whole paths, and of pieces; what is added is kept.
+        Returns the model there, with what is known of poses; what it finds is kept.
         """
-        before, self._site = self._site, None  # if forgetting fails, nothing holds
-        if self._poses is None or before is None or not _is_alike(before, site):
+        before, self._judge = self._judge, None  # if forgetting fails, nothing holds
+        if before is None or not _is_alike(before.site, site):
             of_pieces, is_same = KnownPoses(), site.options.asked_chance is None
-            self._poses = KnownPoses(others=of_pieces if is_same else None), of_pieces
+            judge = PathJudge(site, KnownPoses(others=of_pieces if is_same else None), of_pieces)
             self._edges = None
             self._forget_costs(lambda places: np.ones(len(places), bool))
         else:
-            reach = find_reach(site.rover) + MARGIN * site.terrain.resolution
-            changed = _count_changes(before, site)
-            are_near = partial(changed.are_near, reach=reach)
-            for one in self._poses:
-                one.forget(are_near)
-            if self._edges is not None:
-                self._edges.forget(_find_touching(self._edges, changed, reach))
-            self._forget_costs(are_near)
-        self._site = site
-        return self._poses
+            judge, changed = replace(before, site=site), _find_changed(before.site, site)
+            if changed.any():
+                self._forget_near(changed, judge)
+        self._judge = judge
+        return judge
+
+    def _forget_near(self, changed: NDArray[np.bool_], judge: PathJudge) -> None:
+        """Forget what the cells (ny, nx) of the map that have changed may touch."""
+        site = judge.site
+        reach = find_reach(site.rover) + MARGIN * site.terrain.resolution
+        are_near = _look_near(changed, site.terrain, reach)
+        for known in (judge.known, judge.known_in_pieces):
+            if known is not None:
+                known.forget(are_near)
+        self._forget_costs(are_near)
+        if self._edges is not None:
+            longest = max(one.length for own in self._edges.primitives for one in own)
+            nodes = self._edges.nodes
+            places = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
+            begins_near = _look_near(changed, site.terrain, longest + reach)
+            self._edges.forget(np.flatnonzero(begins_near(places)))
 
     def _forget_costs(self, are_near: Callable[[Floats], NDArray[np.bool_]]) -> None:
         """Forget the costs of pieces of the path with places (n, 2) of which some are near."""
@@ -100,29 +107,6 @@ class EdgeMemory:
         return self._edges
 
 
-class CellCounts:
-    """Numbers of marked cells of a map, to tell by one look whether any is near a place."""
-
-    def __init__(self, terrain: Terrain, marked: NDArray[np.bool_]):
-        self._terrain, self._any = terrain, bool(marked.any())
-        ny, nx = marked.shape
-        self._before = np.zeros((ny + 1, nx + 1), np.int32)
-        if self._any:
-            np.cumsum(marked, axis=0, out=self._before[1:, 1:])
-            np.cumsum(self._before, axis=1, out=self._before)
-
-    def are_near(self, places: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
-        """Return (n,) whether a marked cell is within `reach` [m] of places (n, 2) in x or y."""
-        if not self._any:
-            return np.zeros(len(places), bool)
-        cells = (places - self._terrain.origin) / self._terrain.resolution
-        size, far = np.array(self._terrain.elevation.shape[::-1]), reach / self._terrain.resolution
-        x, y = np.clip(np.floor(cells - far), 0, size).astype(int).T
-        right, up = np.clip(np.ceil(cells + far) + 1, 0, size).astype(int).T
-        before = self._before
-        return (before[up, right] - before[y, right] - before[up, x] + before[y, x]) > 0
-
-
 def _is_alike(asked: Site, site: Site) -> bool:
     """Return whether what was judged at one site holds at another, apart from the heights."""
     old, new = asked.terrain, site.terrain
@@ -138,19 +122,27 @@ def _is_alike(asked: Site, site: Site) -> bool:
     )
 
 
-def _count_changes(asked: Site, site: Site) -> CellCounts:
-    """Return the cells in which the maps of two sites that are alike differ, as counts."""
+def _find_changed(asked: Site, site: Site) -> NDArray[np.bool_]:
+    """Return the cells (ny, nx) in which the maps of two sites that are alike differ."""
     before, now = asked.checked_ground, site.checked_ground
     if asked.terrain is site.terrain and before is now:
-        return CellCounts(site.terrain, np.zeros(site.terrain.elevation.shape, bool))
+        return np.zeros(site.terrain.elevation.shape, bool)
     changed = find_changes(asked.terrain, site.terrain)[1:-1, 1:-1]
     if before is not None and now is not None:
         changed |= before.kinds != now.kinds
-    return CellCounts(site.terrain, changed)
+    return changed
 
 
-def _find_touching(edges: Edges, changed: CellCounts, reach: float) -> NDArray[np.int64]:
-    """Return the places (k,) of nodes whose edges may lead within `reach` [m] of changed cells."""
-    longest = max(one.length for own in edges.primitives for one in own)
-    places = edges.nodes.poses(np.arange(0, edges.nodes.count, HEADINGS))[:, :2]
-    return np.flatnonzero(changed.are_near(places, longest + reach))
+def _look_near(
+    changed: NDArray[np.bool_], terrain: Terrain, reach: float
+) -> Callable[[Floats], NDArray[np.bool_]]:
+    """Return what tells of places (n, 2) if a cell within `reach` [m] in x or y has changed."""
+    cells = math.ceil(reach / terrain.resolution + 0.5)
+    near = ndimage.maximum_filter(changed, 2 * cells + 1, mode="constant")
+
+    def are_near(places: Floats) -> NDArray[np.bool_]:
+        at = np.rint((places - terrain.origin) / terrain.resolution).astype(int)
+        column, row = np.clip(at, 0, np.array(near.shape[::-1]) - 1).T
+        return np.asarray(near[row, column])
+
+    return are_near

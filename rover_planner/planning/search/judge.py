@@ -45,8 +45,8 @@ from rover_planner.planning.path_query import (
     choose,
     generate_paths,
 )
-from rover_planner.planning.search.primitives import PRICES, Gear, Piece
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.edges import PRICES, Gear, Piece
+from rover_planner.planning.search.query import Site
 
 CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""

@@ -10,6 +10,7 @@ that the cost of the shortest path is a bound from below on that of any path on 
 """
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -21,10 +22,10 @@ from rover_planner.angles import wrap
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.connections import Connection
 from rover_planner.planning.search.difficulty import Difficulty, difficulty_of
-from rover_planner.planning.search.edges import PASSES, UNJUDGED, Edges
-from rover_planner.planning.search.graph import Route, Seeds, ShortestPaths
+from rover_planner.planning.search.edges import PASSES, UNJUDGED, Edges, Piece
+from rover_planner.planning.search.graph import Route, Seeds, ShortestPaths, spread
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.primitives import Piece
+from rover_planner.planning.search.nodes import HEADINGS
 
 CAUTIONS = (12.0, 1.0, 0.0)
 """Weights of the difficulties, one after the other; with 0 the search is exact."""
@@ -38,6 +39,15 @@ MOST_REFUSED = 3
 closed in, and each of them costs a search."""
 NEAR_OPTIMAL = 0.02
 """A path is good enough if no path of the lattice costs less by more than this share."""
+_WORDS = {
+    "off_map": "the edge of the map",
+    "unknown_ground": "unknown ground",
+    "wheel_drop": "drops",
+    "wheel_lift": "lifting wheels",
+    "tip_over": "tip-over",
+    "not_settled": "ground that the wheels do not fit",
+}
+"""Words for codes that do not speak for themselves."""
 
 
 @dataclass
@@ -77,6 +87,8 @@ class _Ends:
         self.connections = connections
         self.nodes = np.array([one.node for one in connections], np.int64)
         self.costs = np.array([one.cost + one.surcharge for one in connections])
+        self.seeds = Seeds(self.nodes, self.costs)
+        """The nodes with their costs."""
         self.judged = np.zeros(len(connections), bool)
         self.codes: list[str] = []
         """Codes of the connections that were refused."""
@@ -100,11 +112,6 @@ class _Ends:
     def open_nodes(self) -> NDArray[np.int64]:
         """The nodes (k,) of the connections that may pass."""
         return self.nodes[np.isfinite(self.costs)]
-
-    @property
-    def seeds(self) -> Seeds:
-        """The nodes with their costs."""
-        return Seeds(self.nodes, self.costs)
 
 
 Part = tuple[Edges | _Ends, int]
@@ -247,14 +254,14 @@ class LatticeSearch:
         found = self.judge.judge_pieces([kept.piece(index) for kept, index in parts])
         for (kept, index), judged in zip(parts, found, strict=True):
             kept.write(index, judged.code, judged.cost)
-            if kept is self.edges:
-                self.progress.judged += 1
-                self._note(index)
+            self.progress.judged += kept is self.edges
+        self._note(parts)
         return not any(judged.code for judged in found)
 
-    def _note(self, edge: int) -> None:
-        """Note that the cost of an edge has changed."""
-        self.shortest.note(self.edges.ends(np.array([edge])))
+    def _note(self, parts: Sequence[Part]) -> None:
+        """Note that the costs of parts have changed."""
+        edges = [index for kept, index in parts if kept is self.edges]
+        self.shortest.note(self.edges.ends(np.array(edges, np.int64)))
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""
@@ -271,13 +278,11 @@ class LatticeSearch:
 
     def _refuse(self, route: Route, number: int, code: str) -> None:
         """Close a part of a route for this search: it passes, but the whole path does not."""
-        kept, index = self._parts(route)[number]
+        kept, index = part = self._parts(route)[number]
         if isinstance(kept, Edges):
             self._refused.append((index, float(kept.cost.flat[index])))
-            kept.write(index, code, np.inf)
-            self._note(index)
-        else:
-            kept.write(index, code, np.inf)
+        kept.write(index, code, np.inf)
+        self._note([part])
 
 
 def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -289,3 +294,49 @@ def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[n
     poses = np.concatenate(parts)
     poses[:, 2] = wrap(poses[:, 2])
     return poses, np.concatenate(owners)
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedArea:
+    """The places that the start, or the goal, is connected with."""
+
+    around_goal: bool
+    """True if it lies around the goal; else around the start."""
+    places: NDArray[np.bool_]
+    """(rows, columns) True for its places, row 0 at the smallest y."""
+    area: float
+    """Its area [m2]."""
+    causes: dict[str, float]
+    """Shares of the codes among the edges that would lead across its border, the largest first."""
+
+    def describe(self) -> str:
+        """Return one sentence for people."""
+        whose = "from which the goal can be reached" if self.around_goal else "reachable"
+        shares = ", ".join(
+            f"{_WORDS.get(code, code.replace('_', ' '))} {round(100 * share)} %"
+            for code, share in self.causes.items()
+        )
+        return f"{self.area:.1f} m2 {whose}, closed in by: {shares or 'nothing that is known'}"
+
+
+def find_closed_area(search: LatticeSearch) -> ClosedArea:
+    """Return the smaller one of the areas that start and goal are connected with.
+
+    Edges that were not judged count as open, so that the areas are bounds from above.
+    """
+    edges = search.edges
+    graph, nodes, areas = search.shortest.graph(0.0), edges.nodes, []
+    for around_goal, ends in enumerate(search.ends):
+        inside = np.zeros(nodes.count, bool)
+        crossing = np.zeros(len(edges.codes) + 1, np.int64)
+        spread(graph, ends.open_nodes, bool(around_goal), inside, crossing)
+        counts: Counter[str] = Counter()
+        for code, count in zip([*edges.codes, "off_map"], crossing.tolist(), strict=True):
+            counts[code] += count
+        counts.update(ends.codes)
+        total = max(sum(counts.values()), 1)
+        causes = {code: count / total for code, count in counts.most_common() if count}
+        places = np.asarray(inside.reshape(*nodes.shape, HEADINGS).any(axis=2))
+        area = float(places.sum()) * nodes.cell**2
+        areas.append(ClosedArea(bool(around_goal), places, area, causes))
+    return min(areas, key=lambda one: one.area)

@@ -13,26 +13,34 @@ from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
-from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_physics.rover.steering_joints import tightest_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.planning.candidates import check_pose, generate_candidates, path_length
-from rover_planner.planning.dubins import shortest_dubins_path
-from rover_planner.planning.path_query import Candidate, Pose
-from rover_planner.planning.search.closed_area import ClosedArea, find_closed_area
+from rover_planner.planning.candidates import check_pose
+from rover_planner.planning.path_geometry import path_length, shortest_dubins_path
+from rover_planner.planning.path_query import Candidate, Pose, generate_paths
 from rover_planner.planning.search.connections import (
     MISSED_PRICE,
     Connection,
     connect_end,
     connect_frontier,
 )
-from rover_planner.planning.search.difficulty import estimate_difficulty, steepest_climb
+from rover_planner.planning.search.difficulty import (
+    estimate_difficulty,
+    find_groundless,
+    steepest_climb,
+)
 from rover_planner.planning.search.edge_memory import EdgeMemory
-from rover_planner.planning.search.ground_estimate import find_groundless
+from rover_planner.planning.search.edges import Gear, Piece
 from rover_planner.planning.search.judge import PathJudge, cost_of_path
-from rover_planner.planning.search.lattice_search import LatticeSearch, SearchProgress, join_pieces
+from rover_planner.planning.search.lattice_search import (
+    ClosedArea,
+    LatticeSearch,
+    SearchProgress,
+    find_closed_area,
+    join_pieces,
+)
 from rover_planner.planning.search.nodes import Nodes
-from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import (
     LatticeSettings,
     SearchQuery,
@@ -46,6 +54,13 @@ BEYOND = ("unknown_ground", "off_map")
 START_REFUSED, GOAL_REFUSED = "start_refused", "goal_refused"
 """Outcomes of a search."""
 
+OF_PATH = ("length", "energy", "time", "risk", "failure_chance")
+"""Entries of a report that only a found path has."""
+REPORTED = (
+    "outcome", "reason", "cost", "expanded", "edges_judged", "edges", "seconds_first", "seconds",
+    "repeatable", "warning",
+)  # fmt: skip
+"""Fields of a result that a report has."""
 POSES_PER_SECOND = 20_000
 """Poses that the model may be asked about per second of the budget."""
 EXPANSIONS_PER_POSE = 40
@@ -110,25 +125,17 @@ class SearchResult:
         limit.
         """
         path, closed = self.path, self.closed
+        drive: dict[str, Any] = dict.fromkeys(OF_PATH)
+        if path is not None:
+            spent = path.length, path.prediction.energy[-1], path.prediction.time[-1]
+            risks = path.verdict.risk, path.verdict.failure_chance
+            drive = dict(zip(OF_PATH, (*spent, *risks), strict=True))
         found: dict[str, Any] = to_plain(
             {
                 "found": self.outcome == FOUND,
-                "outcome": self.outcome,
-                "reason": self.reason,
-                "length": None if path is None else path.length,
-                "energy": None if path is None else float(path.prediction.energy[-1]),
-                "time": None if path is None else float(path.prediction.time[-1]),
-                "risk": None if path is None else path.verdict.risk,
-                "failure_chance": None if path is None else path.verdict.failure_chance,
-                "cost": self.cost,
-                "expanded": self.expanded,
-                "edges_judged": self.edges_judged,
-                "edges": self.edges,
-                "seconds_first": self.seconds_first,
-                "seconds": self.seconds,
+                **{name: getattr(self, name) for name in REPORTED},
+                **drive,
                 "bound": self.suboptimality,
-                "repeatable": self.repeatable,
-                "warning": self.warning,
                 "closed_area": None if closed is None else closed.area,
                 "closed_by": None if closed is None else closed.causes,
             }
@@ -144,6 +151,11 @@ def find_path(
 ) -> SearchResult:
     """Search a path from start to goal.
 
+    If chances are weighed, it is the path with the least cost + weight x chance of several: the
+    first is the cheapest one whose chance is accepted, each further one the cheapest with at most
+    half the chance of that before. What is uncertain is mostly common to a path, so that its
+    chance is that of its worst place and does not add up from edge to edge.
+
     Args:
         query: What is asked.
         settings: How it is searched.
@@ -155,24 +167,9 @@ def find_path(
         RoverError: The model refuses an option.
     """
     settings = settings or LatticeSettings()
-    if settings.chance_weight > 0.0 and not settings.ends_at_first:
-        return _weigh_chances(query, settings, memory, on_progress)
-    return _PathFinder(query, settings, memory, on_progress).answer()
-
-
-def _weigh_chances(
-    query: SearchQuery,
-    settings: LatticeSettings,
-    memory: EdgeMemory | None,
-    on_progress: Callable[[SearchProgress], None] | None,
-) -> SearchResult:
-    """Return the path with the least cost + weight x chance of several.
-
-    The first is the cheapest one whose chance is accepted, each further one the cheapest with at
-    most half the chance of that before. What is uncertain is mostly common to a path, so that its
-    chance is that of its worst place and does not add up from edge to edge.
-    """
     began, weight = time.perf_counter(), settings.chance_weight
+    if weight == 0.0 or settings.ends_at_first:
+        return _PathFinder(query, settings, memory, on_progress).answer()
     accepted = min(query.site.options.accepted_chance, ASKED)
     answers, totals, earlier = [], [], None
     while True:
@@ -220,10 +217,9 @@ class _PathFinder:
         ground = None if settings.frontier else query.site.terrain
         self._goal = _check_end("goal", query.goal, ground)
         self._memory = memory or EdgeMemory()
-        self._judge = PathJudge(query.site, *self._memory.begin(query.site))
+        self._judge = self._memory.begin(query.site)
         cell = settings.cell or 0.25 * query.site.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
-        self._radius = tightest_radius(query.site.rover)
         self._repeatable = True
         self._goals, self._to_goal, self._to_frontier = [self._goal], True, False
         self.progress = SearchProgress()
@@ -335,18 +331,10 @@ class _PathFinder:
 
         There is none if start and goal are the same.
         """
-        rover = self._site.rover
         found: list[Piece] = []
-        swing = swing_radius(rover) if can_turn_on_the_spot(rover) else None
-        for gear, turn in ((Gear.FORWARD, None), (Gear.ON_THE_SPOT, swing)):
-            poses = generate_candidates(
-                self._start,
-                self._goal,
-                count=1,
-                waypoint_spacing=self._site.options.waypoint_spacing,
-                min_radius=self._radius,
-                swing_radius=turn,
-            )[0]
+        ends, options = (self._start, self._goal), self._site.options.change(count=1)
+        for gear, turns in ((Gear.FORWARD, False), (Gear.ON_THE_SPOT, True)):
+            poses = generate_paths(self._site.rover, *ends, options, turns=turns)[0]
             if len(poses) > 1 and not (found and np.array_equal(poses, found[0].poses)):
                 found.append(Piece(poses, gear))
         return found
@@ -406,7 +394,7 @@ class _PathFinder:
         spent = time.perf_counter() - self._began
         share = SMOOTHING if self._repeatable else SMOOTHING * min(1.0, budget / spent)
         most = round(share * budget * POSES_PER_SECOND)
-        pieces = smooth(self._judge, progress.pieces, self._radius, most)
+        pieces = smooth(self._judge, progress.pieces, most)
         smoothed = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
         if not smoothed.verdict.traversable:
             smoothed, pieces = best, progress.pieces
@@ -455,13 +443,12 @@ def _check_end(name: str, end: ArrayLike, terrain: Terrain | None) -> Pose:
     return pose
 
 
-def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int) -> list[Piece]:
+def smooth(judge: PathJudge, pieces: list[Piece], most_poses: int) -> list[Piece]:
     """Return the pieces of a path that leads along fewer, wider curves and costs less.
 
     Args:
         judge: The model, which judges each new curve.
         pieces: The path.
-        radius: Tightest radius of the rover [m].
         most_poses: Number of poses that the model may be asked about.
     """
     allowed = judge.asked_poses + most_poses
@@ -469,7 +456,7 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
         first = 0
         while first + span <= len(pieces) and judge.asked_poses < allowed:
             check_interruption()
-            found = _find_shortcut(judge, pieces[first : first + span], radius)
+            found = _find_shortcut(judge, pieces[first : first + span])
             if found is not None:
                 pieces = [*pieces[:first], found, *pieces[first + span :]]
                 first += 1
@@ -478,10 +465,10 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
     return pieces
 
 
-def _find_shortcut(judge: PathJudge, old: list[Piece], radius: float) -> Piece | None:
+def _find_shortcut(judge: PathJudge, old: list[Piece]) -> Piece | None:
     """Return one curve driven forwards that costs less than some pieces; None if none does."""
     start, end = old[0].poses[0], old[-1].poses[-1]
-    spacing = judge.site.options.waypoint_spacing
+    radius, spacing = tightest_radius(judge.site.rover), judge.site.options.waypoint_spacing
     surcharge = sum(one.surcharge for one in old)
     cost = (sum(one.cost for one in old) - surcharge) * (1.0 - GAIN)
     for scale in RADII:

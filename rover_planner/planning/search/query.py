@@ -1,22 +1,86 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A query for a path around obstacles, how it is searched, and in which part of the map."""
+"""A rover on a map, a query for a path there, how it is searched, and files that hold both."""
 
+import json
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.chance.samples import cut_around
-from rover_physics.errors import TerrainError
+from rover_physics.errors import RoverFileError, TerrainError
+from rover_physics.files.npz_file import open_npz
+from rover_physics.files.validation import errors_of, read_as
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.steering_joints import swing_radius
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
+from rover_planner.maps.unobserved_ground import ALLOW, REFUSE, UNOBSERVED_CODE, ObservedGround
+from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
+from rover_planner.planning.path_query import Candidate, PathQueryOptions, assume
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
-from rover_planner.planning.search.site import Site
 
 MAX_NODES = 1_500_000
 """Largest number of nodes of a window; each takes 90 bytes."""
+_ENTRY, _MOST = "way_question", 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A rover on a map; options without lengths get those of the rover."""
+
+    rover: Rover
+    """The rover."""
+    terrain: Terrain
+    """The ground, map frame."""
+    options: PathQueryOptions = field(default_factory=PathQueryOptions)
+    """Options of candidates and of the judgement of paths."""
+    seen: ObservedGround | None = None
+    """The seen part of the map; None if it is not known."""
+    blind_ground: str = ALLOW
+    """What of the ground under the belly that was never seen is refused: a value of the parameter
+    blind_ground."""
+    marked: MarkedPlaces = NONE_MARKED
+    """Places that are impassable."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "options", self.options.fit(self.rover))
+
+    @property
+    def assumed_rover(self) -> Rover:
+        """The rover with friction, torque and payload of the options in place of its own."""
+        return assume(self.rover, self.options.model).change(self.rover)
+
+    @property
+    def checked_ground(self) -> ObservedGround | None:
+        """The seen part of the map if ground that was never seen may be refused; else None."""
+        return None if self.blind_ground == ALLOW else self.seen
+
+    def explain_unseen(self, detail: str = "") -> str:
+        """Return why ground that was never seen is refused, in words, with a detail."""
+        rule = f"(blind_ground is {self.blind_ground})"
+        return f"ground under the belly that was never seen{detail} {rule}"
+
+    def refuse_ground(self, path: Candidate) -> Candidate:
+        """Return a path as the model judged it, refused where its ground is unseen or marked."""
+        if not path.verdict.traversable:
+            return path
+        if self.checked_ground is not None:
+            share = self.checked_ground.share(self.rover, path.poses)
+            first, counted = share.first_refused(self.blind_ground), share.unobserved_share
+            if first >= 0:
+                counted -= 0.0 if self.blind_ground == REFUSE else share.footprint_share
+                detail = f": {100.0 * counted:.1f} % of that along the path"
+                return path.refuse_at(first, UNOBSERVED_CODE, self.explain_unseen(detail))
+        entered = self.marked.find(path.poses)
+        if entered is not None:
+            return path.refuse_at(entered[0], MARKED_CODE, entered[1].describe())
+        return path
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,3 +153,58 @@ def cut_out(site: Site, nodes: Nodes) -> Terrain:
         return cut_around(terrain, ends, margin)
     except TerrainError:
         return terrain
+
+
+@dataclass(frozen=True)
+class _Content:
+    """Content of the entry: a question for a path and the settings of its search."""
+
+    rover: dict[str, Any]
+    start: tuple[float, float, float]
+    goal: tuple[float, float, float]
+    options: PathQueryOptions
+    settings: LatticeSettings
+
+
+def write_query(path: Path, question: SearchQuery, settings: LatticeSettings) -> None:
+    """Write a question to a terrain file (.npz) with one more entry; an old file is replaced.
+
+    Raises:
+        TerrainError: The file cannot be written.
+    """
+    site = question.site
+    text = json.dumps(
+        {
+            "rover": rover_to_dict(site.rover),
+            "start": np.asarray(question.start).tolist(),
+            "goal": np.asarray(question.goal).tolist(),
+            "options": asdict(site.options),
+            "settings": asdict(settings),
+        }
+    )
+    save_terrain(path, site.terrain, **{_ENTRY: text})
+
+
+def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, LatticeSettings]:
+    """Read a question that `write_query` has written.
+
+    Args:
+        path: The file.
+        max_cells: Largest terrain [cells].
+
+    Raises:
+        TerrainError: The terrain in the file is none, or too large.
+        PlanningError: The file holds no question.
+        RoverError: Something in the question is not what it should be.
+    """
+    terrain = load_terrain(path, max_cells)
+    try:
+        with errors_of(path), open_npz(path) as file:
+            content = json.loads(str(file.read(_ENTRY, most=_MOST)))
+    except (RoverFileError, json.JSONDecodeError, RecursionError) as error:
+        raise PlanningError(f"{path} holds no question for a path: {error}") from None
+    with errors_of(path):
+        asked: _Content = read_as(_Content, content, "a question for a path")
+    rover = rover_from_dict(asked.rover, str(path))
+    question = SearchQuery(Site(rover, terrain, asked.options), asked.start, asked.goal)
+    return question, asked.settings

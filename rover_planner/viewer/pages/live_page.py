@@ -10,7 +10,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from rover_planner.viewer.documents.paths import describe_board
 from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.live.live_state import (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from rover_planner.viewer.scene.canvas import find_origin
 from rover_planner.viewer.state import layers
 from rover_planner.viewer.state.background_work import WorkStep

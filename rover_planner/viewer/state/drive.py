@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.records import new_record
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
 from rover_physics.results.record import RESULT, numbers_of
-from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
+from rover_physics.rover.linkage import pack_linkage
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
+from rover_planner.maps.ground_beneath import Standing
 from rover_planner.planning.asked_poses import AskedPoses
 from rover_planner.simulator.driving_forces import find_axles
 
@@ -53,8 +52,7 @@ class RoverState:
     @property
     def axles(self) -> Floats:
         """Directions (6, 3) of the wheels' axles, map frame, positive to the left."""
-        on_rocker = self.rover.suspension.rocker_wheel
-        return find_axles(self.here, np.array([not w.startswith(on_rocker) for w in WHEELS]))
+        return find_axles(pack_linkage(self.rover), self.here)
 
     @property
     def friction_use(self) -> Floats:
@@ -91,10 +89,8 @@ def place_state(
     """
     angles = np.zeros(4) if joints is None else np.asarray(joints)
     contact = np.zeros(6) if contact_angles is None else contact_angles
-    (x, y, z), (roll, pitch, yaw) = position, attitude
-    placement, pose = new_record(PLACEMENT), np.array([x, y, yaw])
-    q = np.array([z, roll, pitch, 0.5 * (angles[0] - angles[1]), *angles[2:]])
-    place(pack_linkage(rover), pose, q, placement)
+    standing = Standing(np.array([*position, *attitude]), angles)
+    placement, (roll, pitch, _) = standing.place(rover), attitude
     sine, cosine = np.sin(contact)[:, None], np.cos(contact)[:, None]
     down = sine * placement.forward - cosine * placement.up
     values = {
@@ -106,7 +102,9 @@ def place_state(
     spin = np.asarray(values.pop("spin", np.zeros(6)))
     rows = {name: np.asarray(value, float)[None] for name, value in values.items()}
     status: NDArray[np.int8] = np.array([PoseStatus.SETTLED], np.int8)
-    return RoverState(rover, prediction_of(pose[None], status, rows, "measured"), spin)
+    return RoverState(
+        rover, prediction_of(standing.pose[None, [0, 1, 5]], status, rows, "measured"), spin
+    )
 
 
 class Trajectory:

@@ -23,7 +23,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from rover_planner.shell.extras import need
 from rover_planner.survey.layers import (
     CLASS_COLOURS,

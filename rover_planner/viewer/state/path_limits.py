@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
-from rover_physics.limits.table import CHANCE, RATIO, Sense, Unit
+from rover_physics.limits.table import CHANCE, LIMITS, RATIO, Sense, Unit
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
@@ -28,8 +28,10 @@ HUGE = 1e5
 """Value from which a number is told in words."""
 BODY = "body"
 """Name of the body among the links."""
-BODY_CODES = ("tilt", "tip_over", "belly")
-"""Codes of limits of the body."""
+BODY_CODES = {row.code for row in LIMITS} - {
+    row.code for row in LIMITS if row.wheel_of or row.elements or find_column(row.reads)[1] > 1
+}
+"""Codes of limits of the body: their values are neither of wheels nor of joints."""
 TITLES = {
     "off_map": "off the map",
     "not_settled": "does not settle",

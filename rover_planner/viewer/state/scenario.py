@@ -15,8 +15,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
-from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, Site
 from rover_planner.viewer.state.drive import RoverState, Trajectory
 from rover_planner.viewer.state.path_limits import (
     Failure,

@@ -14,7 +14,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import Assumptions
+from rover_planner.planning.path_query import Assumptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.studies.rover_values import vary
 from rover_planner.viewer.state.judging import Step, judge_steps, show_recorded

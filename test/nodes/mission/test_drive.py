@@ -14,7 +14,7 @@ from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.grounds import make_terrain, plane

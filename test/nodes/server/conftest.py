@@ -5,7 +5,6 @@ Its log goes silent where another server in this process ends: tests with server
 first in a file.
 """
 
-import gc
 import threading
 from types import SimpleNamespace
 
@@ -22,7 +21,6 @@ WAVES = make_terrain(waves)
 @pytest.fixture(scope="module")
 def shared_nodes():
     """Return ROS, a server and its client."""
-    gc.collect()  # a server of before that is collected later would end the log of this one
     ros = RosRun()
     server, client = spin_server(ros, planner="fan"), ros.spin(PlannerClient(ros))
     yield SimpleNamespace(ros=ros, server=server, client=client)

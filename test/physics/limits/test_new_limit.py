@@ -20,6 +20,14 @@ from rover_physics.limits.table import NEWTONS, Limit
 from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.traversability.pose_classes import IMPASSABLE, RoverOnMap, classify_poses
+from rover_planner.planning.search.query import (
+    LatticeSettings,
+    SearchQuery,
+    Site,
+    read_query,
+    write_query,
+)
+from rover_planner.studies.rover_values import find_key
 from rover_planner.survey.layers import NO_LIMIT, number_limits
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.tile_survey import survey_tile
@@ -56,10 +64,15 @@ def strict(monkeypatch):
     return rover_with(float(np.median(loads)))
 
 
-def test_the_number_survives_the_file_and_without_it_the_limit_is_not_asked(strict):
+def test_the_number_survives_files_and_without_it_the_limit_is_not_asked(strict, tmp_path):
     assert judge_path(load_rover("lsr1"), GROUND, PATH)[1].traversable
     again = rover_from_dict(rover_to_dict(strict), "again")
     assert again == strict and again.limits.further["wheel_load"] > 0.0
+    key = ("limits", "wheel_load")
+    assert find_key(rover_to_dict(strict), "limits.wheel_load") == (key, "")  # as studies ask
+    asked = SearchQuery(Site(strict, GROUND), PATH[0], PATH[-1])
+    write_query(tmp_path / "asked.npz", asked, LatticeSettings())
+    assert read_query(tmp_path / "asked.npz")[0].site.rover == strict
     with pytest.raises(RoverFileError, match=r"limits\.wheel_load is .many."):
         rover_with("many")  # type: ignore[arg-type]
 

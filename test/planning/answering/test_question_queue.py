@@ -20,7 +20,7 @@ from rover_planner.planning.answering.budget import (
     Budget,
     QuestionStoppedError,
 )
-from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
+from rover_planner.planning.answering.questions import Asked, QuestionQueue
 from support.grounds import make_terrain, waves
 from support.waiting import wait_until
 

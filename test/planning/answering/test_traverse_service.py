@@ -11,8 +11,7 @@ from rover_physics.errors import ModelError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.questions import Register
-from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
-from rover_planner.planning.answering.snapshot import GivenPath
+from rover_planner.planning.answering.snapshot import GivenPath, NewerMapError, SearchWatch
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
 from support.grounds import make_terrain, raised, wall_at, waves, with_std
@@ -28,12 +27,12 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     service = make_service(with_std(make_terrain(waves), 0.005), **FAN)
     judged = service.snapshot().answer(start, goal)
     assert judged.candidate.verdict.risk > 1.0  # that of the bounds
-    refused = judged.report.to_dict()
+    refused = judged.report
     assert not refused["traversable"]
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
     service.settings = load_settings(map_sigmas=0.0, **FAN)
-    passed = service.snapshot().answer(start, goal).report.to_dict()
+    passed = service.snapshot().answer(start, goal).report
     assert passed["traversable"] and passed["map_sigmas"] == 0.0
 
 
@@ -42,7 +41,7 @@ def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
     service = make_service(make_terrain(waves))
     judged = service.snapshot().answer((0.0, 0.0, 0.0), (900.0, 0.0, 0.0))
     whole = judged.complete()
-    assert whole.code == "off_map" and whole.report.to_dict()["reason"]
+    assert whole.code == "off_map" and whole.report["reason"]
     assert len(whole.candidate.prediction.poses) < 0.01 * len(whole.candidate.poses)
     assert whole.classes == ()
 
@@ -60,7 +59,9 @@ def test_a_goal_off_the_map_has_a_way_to_the_frontier_if_that_is_wanted(planner)
 def friction_used(service):
     """Return the largest use of friction on a path."""
     service.given_path = GivenPath(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")
-    return float(service.snapshot().check_path().candidate.verdict.max_friction_utilisation)
+    return float(
+        service.given_path.judge(service.snapshot()).candidate.verdict.max_friction_utilisation
+    )
 
 
 @pytest.mark.parametrize(
@@ -145,22 +146,25 @@ def test_an_impossible_tolerance_and_a_payload_without_an_arm_are_refused():
 def test_the_measured_suspension_is_compared_with_the_predicted_one_where_the_rover_stands():
     service = make_service(make_terrain(waves))
     service.given_path = GivenPath(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]), "")
-    free = service.snapshot().check_path()
-    assert free.suspension is None and "suspension_mismatch" not in free.report.to_dict()
+    free = service.given_path.judge(service.snapshot())
+    assert free.suspension is None and "suspension_mismatch" not in free.report
     prediction = free.candidate.prediction
     angles = [*prediction.rocker_angle[0], *prediction.bogie_angle[0]]
     predicted = dict(zip(SUSPENSION_JOINTS, angles, strict=True))
     assert abs(predicted["rocker_left"]) > 0.001
     service.take_joints(predicted)
-    assert service.snapshot().check_path().suspension is None  # where it stands is not known
+    assert (
+        service.given_path.judge(service.snapshot()).suspension is None
+    )  # where it stands is not known
     service.given_path = GivenPath(np.array([[0.5, 0.15, 0.3], [1.0, 0.3, 0.3]]), "")
     for bogie_left in (0.0, 0.2):
         service.take_joints({"bogie_left": predicted["bogie_left"] + bogie_left})
         service.take_pose(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.3]))
-        judgement = service.snapshot().check_path()
+        judgement = service.given_path.judge(service.snapshot())
         expected = dict.fromkeys(SUSPENSION_JOINTS, 0.0) | {"bogie_left": bogie_left}
         assert judgement.suspension.suspension_mismatch == pytest.approx(expected)
-        assert judgement.traversable and judgement.report.has_warning == (bogie_left > 0.0)
+        assert judgement.traversable
+        assert judgement.report["suspension_agrees"] == (bogie_left <= 0.0)
 
 
 def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
@@ -168,7 +172,7 @@ def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     service.given_path = GivenPath(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")
 
     def find_loads():
-        return service.snapshot().check_path().candidate.prediction.wheel_loads
+        return service.given_path.judge(service.snapshot()).candidate.prediction.wheel_loads
 
     stowed, joints = find_loads(), service.settings.rover.manipulator.joints
     service.take_joints({joints[0]: 0.0})

@@ -47,7 +47,7 @@ for parameters, asked in (
         answering.take_terrain(ground)
         answering.snapshot().answer(start, goal, 0.3).complete()
         answering.given_path = GivenPath(np.array([start, goal]), "")
-        answering.snapshot().check_path().complete()
+        answering.given_path.judge(answering.snapshot())
 given = RoverSimulatorParameters(start_x=-1.0)
 simulation = Simulation(load_rover("lsr1"), grounds[0], given)
 simulation.take_path(np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))

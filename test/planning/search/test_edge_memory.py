@@ -10,9 +10,9 @@ from rover_physics.terrain.ground import pack_ground
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search import edge_memory
 from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.edges import Gear, Piece
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.primitives import Gear, Piece
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import Site
 from support.grounds import make_terrain, raised, rocky, waves
 from support.predictions import assert_same
 from support.rovers import LSR1
@@ -27,7 +27,7 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
     options, memory, rng = OPTIONS.change(policy=policy), EdgeMemory(), np.random.default_rng(3)
     for _ in range(12):
         site = Site(LSR1, ground, options)
-        judge = PathJudge(site, *memory.begin(site))
+        judge = memory.begin(site)
         part, whole = judge.check(WAY), PathJudge(site).check(WAY)
         assert repr(part.verdict) == repr(whole.verdict)  # NaN is not equal to NaN
         assert_same(part.prediction, whole.prediction)
@@ -41,13 +41,13 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
 
 def test_where_forgetting_fails_the_next_search_knows_nothing_of_the_old_map(monkeypatch):
     ground, memory = make_terrain(waves), EdgeMemory()
-    PathJudge(Site(LSR1, ground, OPTIONS), *memory.begin(Site(LSR1, ground, OPTIONS))).check(WAY)
+    memory.begin(Site(LSR1, ground, OPTIONS)).check(WAY)
     site = Site(LSR1, raised(ground, np.s_[:, :], 0.3 * np.eye(*ground.elevation.shape)), OPTIONS)
     with monkeypatch.context() as patch:
         patch.setattr(edge_memory, "find_changes", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             memory.begin(site)
-    judge = PathJudge(site, *memory.begin(site))
+    judge = memory.begin(site)
     assert repr(judge.check(WAY).verdict) == repr(PathJudge(site).check(WAY).verdict)
 
 

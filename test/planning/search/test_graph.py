@@ -7,10 +7,9 @@ from scipy.sparse.csgraph import dijkstra
 
 from rover_physics import load_rover
 from rover_planner.planning.search.difficulty import SAMPLE_SHARE, Difficulty, sample_primitives
-from rover_planner.planning.search.edges import FAILS, PASSES, Edges
+from rover_planner.planning.search.edges import FAILS, PASSES, Edges, make_primitives
 from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
 from rover_planner.planning.search.nodes import nodes_within
-from rover_planner.planning.search.primitives import make_primitives
 
 NODES = nodes_within(0.2, (0.0, 0.0), (1.6, 1.2))
 PRIMITIVES = make_primitives(load_rover("lsr1"), 0.2, 0.1)

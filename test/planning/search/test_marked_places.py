@@ -31,8 +31,7 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 from support.grounds import make_terrain, plane
 from support.paths import poses_at
 from support.services import make_service
@@ -49,7 +48,7 @@ def service():
 def test_until_it_is_cleared_a_marked_place_refuses_paths_and_answers_lead_around_it(service):
     service.mark(PLACE)
     service.given_path = GivenPath(poses_at(np.linspace(0.0, 3.0, 40)), "")
-    judged = service.snapshot().check_path()
+    judged = service.given_path.judge(service.snapshot())
     assert judged.code == MARKED_CODE
     assert PLACE.reason in judged.reason and PLACE.date in judged.reason
     rim = judged.candidate.poses[judged.candidate.verdict.first_failure]

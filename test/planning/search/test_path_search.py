@@ -12,9 +12,10 @@ from rover_physics import Terrain, judge_path, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search import lattice_search, path_search, query
+from rover_planner.planning.search.difficulty import find_groundless
 from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.edges import Gear, Piece
 from rover_planner.planning.search.graph import ShortestPaths, edge_cost
-from rover_planner.planning.search.ground_estimate import find_groundless
 from rover_planner.planning.search.judge import PathJudge, cost_of_path
 from rover_planner.planning.search.lattice_search import join_pieces
 from rover_planner.planning.search.nodes import nodes_within
@@ -25,9 +26,7 @@ from rover_planner.planning.search.path_search import (
     OUT_OF_TIME,
     find_path,
 )
-from rover_planner.planning.search.primitives import Gear, Piece
-from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.planning.search.site import Site
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery, Site
 from support.grounds import fractal, make_terrain, pen, plane, raised, waves
 from support.paths import poses_at
 from support.rovers import LSR1

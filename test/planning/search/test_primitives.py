@@ -7,8 +7,8 @@ import pytest
 from rover_physics import load_rover
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.angles import wrap
+from rover_planner.planning.search.edges import Gear, make_primitives
 from rover_planner.planning.search.nodes import HEADINGS, YAWS
-from rover_planner.planning.search.primitives import Gear, make_primitives
 from support.rovers import FIXED, LSR1
 
 SPACING = 0.02
