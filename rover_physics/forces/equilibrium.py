@@ -3,12 +3,13 @@
 
 In the contact frame of a wheel, n points from the ground to the wheel's centre, a is the axis of
 the wheel and t = a x n points forward along the ground; on a rim, n and a may lean. The force of
-the ground on the wheel is N n + T t + S a. There are nine equations: six for the whole rover about its body origin, one about
-each bogie pivot for the bogie and its wheels (eq 15), and one for the differential, which passes
-equal moments from both rockers (eq 14 for both sides). The nine unknowns are six N, two lateral
-terms and the common part of T; `shares` has the shares of the wheels in these. With wheels that
-are not turned, S_i = s0 + s1 x_i (the paper's equal share, and a linear term for the yaw balance).
-Differences between the wheels' T are free, because the rover is over-actuated.
+the ground on the wheel is N n + T t + S a. There are nine equations: six for the whole rover about
+its body origin, one about each bogie pivot for the bogie and its wheels (eq 15), and one for the
+differential, which passes equal moments from both rockers (eq 14 for both sides). The nine
+unknowns are six N, two lateral terms and the common part of T; `shares` has the shares of the
+wheels in these. With wheels that are not turned, S_i = s0 + s1 x_i (the paper's equal share, and a
+linear term for the yaw balance). Differences between the wheels' T are free, because the rover is
+over-actuated.
 Lengths are scaled by a reference length and forces by the weight, so that the numbers of the
 system are of order 1 for any rover.
 """
