@@ -37,7 +37,7 @@ class StuckWatch:
         """
         self._slowest = SLOWEST * nominal_speed
         self._most = PUSHING * max_torque
-        self._past: deque[tuple[float, Floats, Floats, bool]] = deque()
+        self._past: deque[tuple[float, Floats, Floats, Floats, bool]] = deque()
         self.reason = ""
         """Reason why the rover is stuck; empty if it is not."""
 
@@ -66,10 +66,12 @@ class StuckWatch:
         past = self._past
         if past and not 0.0 <= window.time - past[-1][0] <= LONGEST_GAP:
             past.clear()
-        past.append((window.time, window.places, np.sign(window.rolling) * free, wanted))
+        direction = np.sign(window.rolling)
+        advance, rolling = direction * window.travel, direction * free
+        past.append((window.time, window.places, advance, rolling, wanted))
         while len(past) > 1 and window.time - past[1][0] >= PATIENCE - 1e-6:
             past.popleft()
-        times, places, speeds, wishes = zip(*past, strict=True)
+        times, places, advances, speeds, wishes = zip(*past, strict=True)
         elapsed = times[-1] - times[0]
         self.reason = ""
         if elapsed >= PATIENCE - 1e-6 and climb < CLIMBING:
@@ -80,6 +82,8 @@ class StuckWatch:
             rolled = float(find_median(np.abs(np.mean(speeds, axis=0))))
             turns = rolling.max() > self._slowest
             stays = moved < (NO_PROGRESS * rolled if turns else self._slowest)
+            # One that slides back moves and does not get on.
+            stays |= turns and float(np.mean(advances)) < -NO_PROGRESS * rolled
             if stays and rolling.min() > self._slowest:
                 self.reason = "wheels turn and the rover stays"
             elif stays and all(wishes):  # wheels that push may begin to spin

@@ -9,7 +9,15 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 from rover_physics.rover.model import Rover
-from rover_planner.learning.drive_log import HALF_TURN, RATES, ROLL, SUSPENSION, TIME, TORQUES
+from rover_planner.learning.drive_log import (
+    HALF_TURN,
+    RATES,
+    ROLL,
+    SUSPENSION,
+    TIME,
+    TORQUES,
+    WIDTH,
+)
 from rover_planner.learning.stuck_watch import SLOWEST
 from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow
 
@@ -24,8 +32,8 @@ OTHERS = 3
 CHANGE = 1.5
 """Change over the smallest one ever seen from which a value changes: the last digit of a coarse
 sensor may turn at some wheels and stay at others."""
-SPIKE = 1.3
-"""Torque over the largest one of a motor from which it is an error."""
+SPIKE, RUNAWAY = 1.3, 2.0
+"""Torque and rate over the largest ones of a motor from which they are errors."""
 SIGN_TIME = 4.0
 """Time constant of the search for wrong signs [s]."""
 SIGN_SHARE = 0.25
@@ -52,6 +60,10 @@ class WheelHealth:
     def __init__(self, rover: Rover):
         """Start with good sensors."""
         self._weight, self._most = rover.weight, rover.wheel.max_torque
+        self._limits = np.full(WIDTH, np.inf)
+        self._limits[TORQUES] = SPIKE * rover.wheel.max_torque
+        self._limits[RATES] = RUNAWAY * rover.wheel.max_speed
+        self._limits[_ANGLES] = HALF_TURN
         self._slowest = SLOWEST * rover.nominal_speed / rover.wheel.radius
         self._watches = np.zeros(1, _WATCH)
         self._watches["steps"] = np.inf
@@ -62,13 +74,9 @@ class WheelHealth:
         self._backward = np.zeros(WHEEL_COUNT)
 
     def clean(self, row: Floats) -> Floats:
-        """Return a row without torques that no motor has and angles that no rover has."""
-        spikes = np.abs(row[TORQUES]) > SPIKE * self._most
-        turned = np.abs(row[_ANGLES]) > HALF_TURN
-        if spikes.any() or turned.any():
-            row = row.copy()
-            row[TORQUES][spikes], row[_ANGLES][turned] = np.nan, np.nan
-        return row
+        """Return a row without torques and rates that no motor, and angles that no rover has."""
+        wrong = np.abs(row) > self._limits
+        return np.where(wrong, np.nan, row) if wrong.any() else row
 
     def take(self, row: Floats) -> None:
         """Take a row of measurements."""

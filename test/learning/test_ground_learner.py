@@ -153,7 +153,8 @@ def test_torques_beyond_what_holds_the_rover_and_slip_that_noise_hides_prove_no_
 
 @pytest.mark.parametrize("speed", [0.02, 0.06, 0.6])
 def test_slip_over_a_short_way_is_seen_at_any_speed(speed):
-    rover, way = replace(ROVER, nominal_speed=speed), 0.15
+    wheel, way = replace(ROVER.wheel, max_speed=2.0 * speed / ROVER.wheel.radius), 0.15
+    rover = replace(ROVER, nominal_speed=speed, wheel=wheel)
     rows = climb(rover, SLOPE, 1.2 / speed, speed)
     rows[(rows[:, X] > 0.0) & (rows[:, X] < way), RATES] *= 1.6
     estimate = learn(rows, rover=rover).estimate
@@ -241,6 +242,15 @@ def test_a_bad_sensor_is_told_and_not_believed(sensors, spoil, word):
     assert estimate.friction.high is None
     assert estimate.friction.low < 1.2 * SLOPE
     assert abs(estimate.resistance) < 0.1
+
+
+def test_spikes_of_rates_that_no_motor_has_are_no_slip():
+    rows = climb(ROVER, SLOPE, 20.0)[::5]
+    spikes = np.random.default_rng(3).random((len(rows), 6)) < 0.01
+    rows[:, RATES][spikes] = 300.0
+    estimate = learn(rows).estimate
+    assert estimate.slip_time is None and estimate.immobilised_time is None
+    assert not estimate.faults
 
 
 def test_a_torque_that_contradicts_the_others_while_a_drive_begins_has_no_wrong_sign():

@@ -56,6 +56,16 @@ def test_a_rover_that_creeps_rests_or_climbs_is_not_stuck():
     assert first_notice(0.0, SPEED, 1.0, climb=0.05) is None
 
 
+def test_a_rover_that_slides_back_while_its_wheels_turn_is_stuck_within_two_seconds():
+    watch = StuckWatch(SPEED, MAX_TORQUE)
+    for time in PERIOD * np.arange(1, 40):
+        slides = replace(
+            window(float(time), -0.3 * SPEED * time, SPEED), travel=np.full(6, -0.3 * SPEED)
+        )
+        stuck = watch.update(slides, np.ones(6), 0.0)
+        assert stuck == (time > 1.25)
+
+
 def test_a_rover_that_turns_back_is_not_stuck():
     watch, turn, back = StuckWatch(SPEED, MAX_TORQUE), 3.05, 0.85
     for time in PERIOD * np.arange(1, 60):
