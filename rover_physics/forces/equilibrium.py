@@ -2,16 +2,19 @@
 """Static equilibrium of a settled rover: wheel loads for given torques (paper 3.2 in 3-D).
 
 In the contact frame of a wheel, n points from the ground to the wheel's centre, a is the axis of
-the wheel and t = a x n points forward along the ground. The force of the ground on the wheel is
-N n + T t + S a. There are nine equations: six for the whole rover about its body origin, one about
-each bogie pivot for the bogie and its wheels (eq 15), and one for the differential, which passes
-equal moments from both rockers (eq 14 for both sides). The nine unknowns are six N, two lateral
-terms and the common part of T; `shares` has the shares of the wheels in these. With wheels that
-are not turned, S_i = s0 + s1 x_i (the paper's equal share, and a linear term for the yaw balance).
-Differences between the wheels' T are free, because the rover is over-actuated.
+the wheel and t = a x n points forward along the ground; on a rim, n and a may lean. The force of
+the ground on the wheel is N n + T t + S a. There are nine equations: six for the whole rover about
+its body origin, one about each bogie pivot for the bogie and its wheels (eq 15), and one for the
+differential, which passes equal moments from both rockers (eq 14 for both sides). The nine
+unknowns are six N, two lateral terms and the common part of T; `shares` has the shares of the
+wheels in these. With wheels that are not turned, S_i = s0 + s1 x_i (the paper's equal share, and a
+linear term for the yaw balance). Differences between the wheels' T are free, because the rover is
+over-actuated.
 Lengths are scaled by a reference length and forces by the weight, so that the numbers of the
 system are of order 1 for any rover.
 """
+
+import numpy as np
 
 from rover_physics.forces.shares import FREE_LATERAL_WHEELS, SHARES, write_shares
 from rover_physics.numerics.kernels import kernel
@@ -86,11 +89,13 @@ def solve_equations(columns, balance):
 def _write_frames(placement, contacts, frames):
     for wheel in range(6):
         axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
-        s, c = contacts.sine[wheel], contacts.cosine[wheel]
+        s, c, lean = contacts.sine[wheel], contacts.cosine[wheel], contacts.lean[wheel]
+        upright = 1.0 / np.sqrt(1.0 + lean * lean)
         for i in range(3):
-            frames[wheel, 0, i] = c * up[i] - s * forward[i]
+            radial = c * up[i] - s * forward[i]
+            frames[wheel, 0, i] = upright * (radial + lean * axis[i])
             frames[wheel, 1, i] = s * up[i] + c * forward[i]
-            frames[wheel, 2, i] = axis[i]
+            frames[wheel, 2, i] = upright * (axis[i] - lean * radial)
 
 
 @kernel

@@ -17,7 +17,13 @@ import numpy as np
 from rover_physics.forces.equilibrium import write_equations
 from rover_physics.forces.servo_balance import STRETCH, contact_velocity, motion_made
 from rover_physics.forces.servo_ground import direction_of_travel
-from rover_physics.forces.servo_motion import MOTIONS, TURN_DISTANCE, WEIGHTS, find_motions
+from rover_physics.forces.servo_motion import (
+    MOTIONS,
+    TURN_DISTANCE,
+    WEIGHTS,
+    find_motions,
+    lean_on_rims,
+)
 from rover_physics.forces.servo_search import CREEP, find_drive, search_everywhere
 from rover_physics.forces.servo_wheel import D, S, T
 from rover_physics.forces.shares import write_shares
@@ -52,6 +58,7 @@ def balance_servos(model, work):
     linkage, settings, servo = model.linkage, model.settings, work.servo
     columns = np.int64(1)  # a literal would be compiled as a type of its own
     write_shares(linkage, work.placement, work.balance.shares)
+    lean_on_rims(work.placement, work.contacts)
     write_equations(linkage, work.placement, work.contacts, columns, work.balance)
     push = linkage.radius * linkage.mass * linkage.gravity
     servo.droop = settings.servo_droop
@@ -108,6 +115,7 @@ def write_servo_forces(model, work, result):
         strength += largest
         saturation += result.torque_saturation[wheel]
         power += max(torque * servo.rim_speed[wheel] * settings.speed / linkage.radius, 0.0)
+        _stand_upright(work.contacts.lean[wheel], wheel, result)
     result.power = power
     result.speed_share = servo.speed_share
     result.stalls = servo.stall
@@ -117,6 +125,15 @@ def write_servo_forces(model, work, result):
     for k in range(MOTIONS):
         result.deviation[k] = servo.deviation[k]
     result.deviation[2] /= TURN_DISTANCE * linkage.radius
+
+
+@kernel
+def _stand_upright(lean, wheel, result):
+    """Write load and lateral force of a wheel along its radius and axle, whatever the lean."""
+    N, S = result.wheel_loads[wheel], result.lateral[wheel]
+    upright = 1.0 / np.sqrt(1.0 + lean * lean)
+    result.wheel_loads[wheel] = upright * (N - lean * S)
+    result.lateral[wheel] = upright * (S + lean * N)
 
 
 @kernel

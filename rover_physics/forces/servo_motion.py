@@ -36,6 +36,9 @@ GAUSS_POINT = 1.0 / np.sqrt(3.0)
 FLUSH = 0.02
 """Angle [rad] between axle and ground from which a wheel stands on its rim; a flush wheel has its
 whole width on the ground."""
+STEEPEST, TANGENT = 1.0, 3e-3
+"""Slope of the ground, and angle [rad] between it and a rim, up to which the rim has its normal:
+45 degrees, as for a face, and the precision of contacts."""
 
 SERVO_STATE = record_type(
     ("X", float, (UNKNOWNS, COLUMNS)),  # loads and missing forces per unit of wheel force
@@ -84,6 +87,29 @@ over the nominal speed, turning rates in rad per TURN_DISTANCE of nominal distan
 
 
 @kernel
+def lean_on_rims(placement, contacts):
+    """Let the normals of contacts on rims lean along the axle, with the normal of the ground.
+
+    A rim is tangent to the ground, and has its normal, but on an edge, where the wheel's radius is
+    the normal. It stays that of a wheel that meets a face: this stands on the ground below, too.
+    """
+    for wheel in range(6):
+        slope_x, slope_y = contacts.slope[wheel, 0], contacts.slope[wheel, 1]
+        across, s, c = contacts.across[wheel], contacts.sine[wheel], contacts.cosine[wheel]
+        is_held = contacts.held_height[wheel] == contacts.held_height[wheel]
+        is_face = slope_x * slope_x + slope_y * slope_y > STEEPEST * STEEPEST
+        if across == 0.0 or contacts.inside[wheel] or is_held or is_face:
+            continue
+        axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
+        rise = slope_x * forward[0] + slope_y * forward[1]
+        fall = up[2] - slope_x * up[0] - slope_y * up[1]
+        upright = s * rise + c * fall
+        along = axis[2] - slope_x * axis[0] - slope_y * axis[1]
+        if abs(s * fall - c * rise) <= TANGENT * upright and along * across < 0.0:
+            contacts.lean[wheel] = along / upright
+
+
+@kernel
 def find_motions(linkage, placement, contacts, balance, servo):
     """Write the motions and the equilibrium into a SERVO_STATE; return False if it is singular.
 
@@ -103,7 +129,7 @@ def find_motions(linkage, placement, contacts, balance, servo):
             servo.M[row, 6 + k] = 0.0
         X[row, WEIGHTS] = balance.B[row, 0]
     for wheel in range(6):
-        servo.spread[wheel] = _spread(linkage, contacts, balance, wheel)
+        servo.spread[wheel] = _spread(linkage, placement, contacts, wheel)
         if servo.yields[wheel]:
             servo.spread[wheel] *= GAUSS_POINT
         for row in range(UNKNOWNS):
@@ -152,9 +178,9 @@ def _write_base(placement, turn_distance, servo):
 
 
 @kernel
-def _spread(linkage, contacts, balance, wheel):
+def _spread(linkage, placement, contacts, wheel):
     """Return the distance [m] of the ends of a contact line from its middle."""
-    axis, slope = balance.frames[wheel, 2], contacts.slope[wheel]
+    axis, slope = placement.axis[wheel], contacts.slope[wheel]
     rise = axis[2] - slope[0] * axis[0] - slope[1] * axis[1]
     tilt = abs(rise) / np.sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1])
     return 0.5 * linkage.width * max(1.0 - tilt / FLUSH, 0.0)

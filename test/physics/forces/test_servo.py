@@ -55,6 +55,27 @@ def test_the_nine_equations_hold(rover, curvature, ground, half, options, least)
     assert max(sizes) <= 2e-7
 
 
+def test_a_wheel_on_its_rim_has_friction_about_the_normal_of_the_ground():
+    model = pack_model(LSR1, drive_ground("slope", 25.0), SERVO)
+    poses, leaning = random_poses(1, 40, 1.0), 0
+    for results, work in evaluate_in_turn(model, poses, motions_of(model, poses, np.zeros(40))):
+        result, contacts, placement = results[0], work.contacts, work.placement
+        leans = abs(contacts.lean) > 0.02  # else other circles share the load
+        for wheel in np.flatnonzero(leans & (result["speed_share"] > 0.0)):
+            c, s = contacts.cosine[wheel], contacts.sine[wheel]
+            radius = c * placement.up[wheel] - s * placement.forward[wheel]
+            forward = s * placement.up[wheel] + c * placement.forward[wheel]
+            force = result["wheel_loads"][wheel] * radius
+            force = force + result["tangential"][wheel] * forward
+            force = force + result["lateral"][wheel] * placement.axis[wheel]
+            normal = np.append(-contacts.slope[wheel], 1.0)
+            load = force @ normal / np.linalg.norm(normal)
+            used = np.sqrt(force @ force - load**2) / (result["friction"][wheel] * load)
+            assert used == pytest.approx(result["friction_utilisation"][wheel], abs=0.01)
+            leaning += 1
+    assert leaning >= 20
+
+
 def test_without_turning_the_forces_balance_by_an_independent_model():
     narrow = replace(LSR1, wheel=replace(LSR1.wheel, width=1e-3))  # no scrub
     prediction = judge_path(narrow, fractal(3), poses_at(np.linspace(-1.5, 1.5, 30)), SERVO)[0]
