@@ -60,7 +60,6 @@ CONTACTS = record_type(
     ("across", float, (6,)),  # distance of the contact from the wheel's middle plane [m]
     ("inside", np.int64, (6,)),  # 1 if the contact is a peak of the ground between the rims
     ("slope", float, (6, 2)),  # slope of the ground at the contact along x and y
-    ("lean", float, (6,)),  # tangent of the angle by which the forces' normal leans to the left
     ("peak", float, (6, 3)),  # point of the ground that touches [m], if the contact is inside
     ("kept", np.int64, (6,)),  # number of contacts kept since the last QUICK
     ("kept_across", float, (6, KEPT)),  # `across` of the kept contacts; new ones replace old ones

@@ -37,6 +37,7 @@ BALANCE = record_type(
     ("lateral", float, (6, 1 + FREE_FORCES)),  # lateral forces S
     ("A", float, (UNKNOWNS, UNKNOWNS)),  # work space: the equations
     ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
+    ("lean", float, (6,)),  # tangents of the angles by which the normals lean to the left
     ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
     ("units", float, (6, 3, UNKNOWNS)),  # terms of unit forces N, T, S of each wheel
     ("shares", SHARES),  # shares of the wheels in the common forces
@@ -63,6 +64,7 @@ def balance_forces(linkage, placement, contacts, columns, balance):
         balance: BALANCE, written.
     """
     write_shares(linkage, placement, balance.shares)
+    balance.lean[:] = 0.0
     write_equations(linkage, placement, contacts, columns, balance)
     return solve_equations(columns, balance)
 
@@ -86,16 +88,16 @@ def solve_equations(columns, balance):
 
 
 @kernel
-def _write_frames(placement, contacts, frames):
+def _write_frames(placement, contacts, lean, frames):
     for wheel in range(6):
         axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
-        s, c, lean = contacts.sine[wheel], contacts.cosine[wheel], contacts.lean[wheel]
-        upright = 1.0 / np.sqrt(1.0 + lean * lean)
+        s, c, along = contacts.sine[wheel], contacts.cosine[wheel], lean[wheel]
+        upright = 1.0 / np.sqrt(1.0 + along * along)
         for i in range(3):
             radial = c * up[i] - s * forward[i]
-            frames[wheel, 0, i] = upright * (radial + lean * axis[i])
+            frames[wheel, 0, i] = upright * (radial + along * axis[i])
             frames[wheel, 1, i] = s * up[i] + c * forward[i]
-            frames[wheel, 2, i] = upright * (axis[i] - lean * radial)
+            frames[wheel, 2, i] = upright * (axis[i] - along * radial)
 
 
 @kernel
@@ -108,7 +110,7 @@ def write_equations(linkage, placement, contacts, columns, balance):
     """
     A, B, units = balance.A, balance.B, balance.units
     common, free = balance.shares.common, balance.shares.free
-    _write_frames(placement, contacts, balance.frames)
+    _write_frames(placement, contacts, balance.lean, balance.frames)
     for wheel in range(6):
         _write_units(linkage, placement, contacts, balance, wheel)
     for row in range(UNKNOWNS):

@@ -58,7 +58,7 @@ def balance_servos(model, work):
     linkage, settings, servo = model.linkage, model.settings, work.servo
     columns = np.int64(1)  # a literal would be compiled as a type of its own
     write_shares(linkage, work.placement, work.balance.shares)
-    lean_on_rims(work.placement, work.contacts)
+    lean_on_rims(work.placement, work.contacts, work.balance.lean)
     write_equations(linkage, work.placement, work.contacts, columns, work.balance)
     push = linkage.radius * linkage.mass * linkage.gravity
     servo.droop = settings.servo_droop
@@ -115,7 +115,7 @@ def write_servo_forces(model, work, result):
         strength += largest
         saturation += result.torque_saturation[wheel]
         power += max(torque * servo.rim_speed[wheel] * settings.speed / linkage.radius, 0.0)
-        _stand_upright(work.contacts.lean[wheel], wheel, result)
+        _stand_upright(work.balance.lean[wheel], wheel, result)
     result.power = power
     result.speed_share = servo.speed_share
     result.stalls = servo.stall

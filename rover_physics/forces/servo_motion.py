@@ -87,13 +87,14 @@ over the nominal speed, turning rates in rad per TURN_DISTANCE of nominal distan
 
 
 @kernel
-def lean_on_rims(placement, contacts):
-    """Let the normals of contacts on rims lean along the axle, with the normal of the ground.
+def lean_on_rims(placement, contacts, lean):
+    """Write the `lean` of normals on rims along the axle, with the normal of the ground.
 
     A rim is tangent to the ground, and has its normal, but on an edge, where the wheel's radius is
     the normal. It stays that of a wheel that meets a face: this stands on the ground below, too.
     """
     for wheel in range(6):
+        lean[wheel] = 0.0
         slope_x, slope_y = contacts.slope[wheel, 0], contacts.slope[wheel, 1]
         across, s, c = contacts.across[wheel], contacts.sine[wheel], contacts.cosine[wheel]
         is_held = contacts.held_height[wheel] == contacts.held_height[wheel]
@@ -106,7 +107,7 @@ def lean_on_rims(placement, contacts):
         upright = s * rise + c * fall
         along = axis[2] - slope_x * axis[0] - slope_y * axis[1]
         if abs(s * fall - c * rise) <= TANGENT * upright and along * across < 0.0:
-            contacts.lean[wheel] = along / upright
+            lean[wheel] = along / upright
 
 
 @kernel

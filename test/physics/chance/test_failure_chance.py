@@ -165,6 +165,17 @@ def test_rocks_beside_the_path_count(monkeypatch):
     assert told == judge_path(*asked, accepted_chance=1.0)[1].failure_chance > 0.2
 
 
+def test_walls_beside_the_path_count():
+    """Between them the wheels, which end at 0.35 m, use next to nothing of any limit."""
+    walls = make_terrain(lambda x, y: 0.5 * (abs(y) > 0.37), 0.02, 1.5)
+    rover = replace(load_rover("lsr1"), uncertainty=replace(EXACT, position=0.03))
+    for ground in (walls, with_std(walls, 1e-6)):
+        asked = rover, ground, straight(5), SLIPPERY
+        prediction, found = judge_path(*asked, sigmas=0, accepted_chance=1.0)
+        assert found.traversable and prediction.friction_utilisation.max() < 0.1
+        assert found.failure_chance > 0.1
+
+
 def test_uncertain_heights_count():
     ground, rover = plane(0.25, 0.0), rover_with()
     assert chance_on(ground, rover).failure_chance == 0.0

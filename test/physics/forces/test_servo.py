@@ -60,7 +60,7 @@ def test_a_wheel_on_its_rim_has_friction_about_the_normal_of_the_ground():
     poses, leaning = random_poses(1, 40, 1.0), 0
     for results, work in evaluate_in_turn(model, poses, motions_of(model, poses, np.zeros(40))):
         result, contacts, placement = results[0], work.contacts, work.placement
-        leans = abs(contacts.lean) > 0.02  # else other circles share the load
+        leans = abs(work.balance.lean) > 0.02  # else other circles share the load
         for wheel in np.flatnonzero(leans & (result["speed_share"] > 0.0)):
             c, s = contacts.cosine[wheel], contacts.sine[wheel]
             radius = c * placement.up[wheel] - s * placement.forward[wheel]
