@@ -130,7 +130,7 @@ def test_words_say_what_to_do_and_what_it_does_to_the_rover():
     old, new = (
         one.prediction.wheel_loads[advice.judged.place] for one in (advice.judged, payload.judged)
     )
-    rear = [wheel.endswith("rear") for wheel in WHEELS]
+    rear = [wheel.startswith("rear") for wheel in WHEELS]
     expected = (
         rf"Carry .* kg less at the arm's tip: the rear wheels then carry "
         rf"{(old - new)[rear].sum():.1f} N less; largest use 0\..* m \(friction\)"
