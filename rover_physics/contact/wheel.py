@@ -174,7 +174,6 @@ def blend_contact(model, work, wheel):
     the angle of its face.
     """
     samples, contacts = model.samples, work.contacts
-    contacts.lean[wheel] = 0.0
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
         s, c = np.sin(contacts.held_angle[wheel]), np.cos(contacts.held_angle[wheel])
         write_point(samples.radius, work, wheel, (s, c), 0.0)

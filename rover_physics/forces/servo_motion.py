@@ -94,6 +94,7 @@ def lean_on_rims(placement, contacts):
     the normal. It stays that of a wheel that meets a face: this stands on the ground below, too.
     """
     for wheel in range(6):
+        contacts.lean[wheel] = 0.0
         slope_x, slope_y = contacts.slope[wheel, 0], contacts.slope[wheel, 1]
         across, s, c = contacts.across[wheel], contacts.sine[wheel], contacts.cosine[wheel]
         is_held = contacts.held_height[wheel] == contacts.held_height[wheel]

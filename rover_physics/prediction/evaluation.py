@@ -296,6 +296,7 @@ def _balance(model, work):
     linkage, policy = model.linkage, model.settings.policy
     if policy == TorquePolicy.SERVO:
         return balance_servos(model, work)
+    work.contacts.lean[:] = 0.0  # servos may have balanced the same pose before
     columns = 1 if policy == TorquePolicy.EQUAL else 1 + FREE_FORCES
     return balance_forces(linkage, work.placement, work.contacts, columns, work.balance)
 
