@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rover_physics import judge_path
+from rover_physics.names import WHEELS
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
@@ -125,12 +126,16 @@ def test_a_remedy_of_a_path_into_a_marked_place_keeps_out_of_it(monkeypatch):
 
 def test_words_say_what_to_do_and_what_it_does_to_the_rover():
     advice, _ = advise_on("heavy load")
-    words = {one.levers[0].lever.name: one.describe() for one in advice.found}
-    expected = (
-        r"Carry .* kg less at the arm's tip: the rear wheels then carry .* N less; "
-        r"largest use 0\..* m \(friction\)"
+    (payload,) = (one for one in advice.found if one.levers[0].lever.name == "payload")
+    old, new = (
+        one.prediction.wheel_loads[advice.judged.place] for one in (advice.judged, payload.judged)
     )
-    assert re.fullmatch(expected, words["payload"])
+    rear = [wheel.startswith("rear") for wheel in WHEELS]
+    expected = (
+        rf"Carry .* kg less at the arm's tip: the rear wheels then carry "
+        rf"{(old - new)[rear].sum():.1f} N less; largest use 0\..* m \(friction\)"
+    )
+    assert re.fullmatch(expected, payload.describe())
 
 
 def test_several_levers_are_set_where_none_helps_alone(monkeypatch):

@@ -174,15 +174,14 @@ def test_soil_friction_and_classes_stay_where_a_newer_map_has_none():
     known |= {"friction": np.full(shape, 0.4), "ground_class": np.full(shape, 2.0)}
     living = loaded(replace(PRIOR, **known))
     local = local_map((0.0, 0.0), 0.1)
-    classes = np.full(local.elevation.shape, np.nan)
-    classes[0, 0] = 5.0
-    living.merge(replace(local, ground_class=classes), TOPIC, 1.0)
+    friction, classes = np.full((2, *local.elevation.shape), np.nan)
+    friction[0, 0], classes[0, 0] = 0.5, 5.0
+    living.merge(replace(local, friction=friction, ground_class=classes), TOPIC, 1.0)
     living.merge(local, TOPIC, 2.0)
     terrain = living.snapshot().terrain
     assert terrain.soil_names == known["soil_names"] and (terrain.soil == 1).all()
-    np.testing.assert_array_equal(terrain.friction, 0.4)
-    found = terrain.ground_class
-    assert (found == 5.0).sum() == 1 and (found == 2.0).sum() == found.size - 1
+    for found, new, old in ((terrain.friction, 0.5, 0.4), (terrain.ground_class, 5.0, 2.0)):
+        assert (found == new).sum() == 1 and (found == old).sum() == found.size - 1
 
 
 def test_the_most_frequent_class_of_finer_cells_counts():

@@ -8,7 +8,10 @@ import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
 
+import zarr
+
 from rover_physics import SweepOptions, Terrain, judge_poses
+from rover_physics.terrain.layers import GRID_LAYERS
 from rover_physics.traversability.pose_classes import IMPASSABLE, RoverOnMap, classify_poses
 from rover_planner.survey.layers import (
     NO_LIMIT,
@@ -18,6 +21,7 @@ from rover_planner.survey.layers import (
     unpack_bits,
 )
 from rover_planner.survey.layout import choose_chunk, find_halo
+from rover_planner.survey.map_source import MAP, StoredMap, keep_map
 from rover_planner.survey.tile_survey import outline_of, survey_tile
 from support.grounds import raised
 from support.rovers import LSR1
@@ -222,3 +226,18 @@ def test_chunks_take_some_seconds_and_are_not_too_many():
             rows, columns = (-(-size // side) for size in shape)
             assert side % 64 == 0 and rows * columns <= 11_000
             assert side * side * headings < 1_000_000 or rows * columns > 5_000
+
+
+def test_the_map_in_a_store_has_all_layers(ground):
+    shape, box = ground.elevation.shape, np.s_[3:40, 5:60]
+    classes = np.arange(ground.elevation.size, dtype=float).reshape(shape) % 7.0
+    full = replace(
+        with_layers(ground, 20, 30), elevation_std=np.full(shape, 0.01), ground_class=classes
+    )
+    group = zarr.create_group(zarr.storage.MemoryStore())
+    keep_map(group, full)
+    kept = StoredMap(group[MAP])
+    assert kept.soil_names == full.soil_names
+    for name, layer in kept.read(box).items():
+        np.testing.assert_array_equal(layer, getattr(full, name)[box])
+    assert kept.read(box).keys() == GRID_LAYERS.keys()

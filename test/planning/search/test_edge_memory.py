@@ -9,7 +9,7 @@ import pytest
 from rover_physics.terrain.ground import pack_ground
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search import edge_memory
-from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.edge_memory import EdgeMemory, _look_near
 from rover_planner.planning.search.edges import Gear, Piece
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.query import Site
@@ -59,3 +59,19 @@ def test_a_map_with_friction_is_packed_for_the_first_search_alone():
         PathJudge(Site(LSR1, ground)).judge_pieces([Piece(WAY, Gear.FORWARD)])
         packed.append(pack_ground.cache_info().misses)
     assert packed[0] == packed[1]
+
+
+def test_no_place_near_a_changed_cell_is_overlooked_and_none_farther_than_two_cells_is_taken():
+    rng, ground = np.random.default_rng(1), make_terrain(waves)
+    cell, (ny, nx) = ground.resolution, ground.elevation.shape
+    for reach in (0.0, 0.31, 1.234):
+        changed = rng.random((ny, nx)) < 3.0 / (ny * nx)
+        changed[0, 0] = True
+        x, y = (
+            origin + cell * k
+            for origin, k in zip(ground.origin, np.nonzero(changed)[::-1], strict=True)
+        )
+        places = rng.uniform(*np.reshape(ground.bounds, (2, 2)).T, (5000, 2))
+        aside = np.maximum(abs(places[:, :1] - x), abs(places[:, 1:] - y)).min(axis=1)
+        near = _look_near(changed, ground, reach)(places)
+        assert near[aside <= reach].all() and not near[aside > reach + 2.0 * cell].any()
