@@ -5,10 +5,10 @@ Poses that use less than FAR of every limit keep them in all samples, on uneven 
 place a little aside has other contacts, those that use less than UNEVEN_FAR; what stands beside
 them is looked for by some of them, ASIDE apart. So do those of which none around uses more than
 NEAR with the least friction and torque of all samples, and all else off to either side. The others
-are evaluated anew in each sample, with the contacts that they have at its place: samples that share
-a place settle once. Drops and poses between waypoints are those of the prediction. On even ground a
-share of the model's error counts. Where a sample would leave the known ground, the pose stays at
-its place: what nobody knows is no failure.
+are evaluated anew in each sample, with the contacts that they have at its place: samples that
+share a place settle once. Drops and poses between waypoints are those of the prediction. On even
+ground a share of the model's error counts. Where a sample would leave the known ground, the pose
+stays at its place: what nobody knows is no failure.
 """
 
 from dataclasses import dataclass, replace
