@@ -47,9 +47,9 @@ EXTRAS = {
         "pytest-xdist>=3.7,<4",
         "hypothesis>=6.98,<7",
         "playwright>=1.48,<2",
-        "mujoco>=3.2,<5",
+        "mujoco>=3.3,<5",
     ],
-    "bench": ["mujoco>=3.2,<5"],
+    "bench": ["mujoco>=3.3,<5"],
     "dev": [
         "ruff>=0.9,<1",
         "oxlint>=1.0,<2",

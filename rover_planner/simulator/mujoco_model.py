@@ -24,10 +24,13 @@ PIVOT_DAMPING = 0.01216
 LEAST_MASS = 1e-4
 """Least mass of a part, over that of the rover: MuJoCo refuses parts without mass."""
 
+# MuJoCo's native collision code reverses some normals between cylinders and height fields.
 _MODEL = """
 <mujoco model={name}>
   <option timestep="{timestep}" gravity="0 0 -{gravity}" integrator="implicitfast" cone="elliptic"
-    impratio="20" iterations="50" tolerance="1e-10"/>
+    impratio="20" iterations="50" tolerance="1e-10">
+    <flag nativeccd="disable"/>
+  </option>
   <default>
     <geom friction="{friction} 0 0" condim="3" solref="{contact_time} 1"
       solimp="0.97 0.995 {give}"/>

@@ -20,6 +20,7 @@ from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.supervisor import TractionSupervisor
 from support.grounds import plane
+from support.reference_drives import drive_ground
 from support.rovers import LSR1
 
 SPEED, CURVATURE = 0.03, 0.5
@@ -46,6 +47,15 @@ def test_servos_with_droop_lose_speed_by_their_torque():
     assert torques.sum() == pytest.approx(needed, rel=0.03)
     lost = 1.0 - plant.wheel_rates / rate
     np.testing.assert_allclose(lost, 0.3 * torques / most, atol=5e-3)
+
+
+def test_the_ground_never_pulls_a_wheel_down():
+    """MuJoCo's own collision code reverses some normals between cylinders and height fields."""
+    plant = MujocoRover(LSR1, drive_ground("step", 0.1), (-1.2, 0.0, 0.0))
+    for _ in range(100):
+        plant.drive(SPEED, 0.0, 0.02)
+        contacts = plant._data.contact[: plant._data.ncon]
+        assert all(contact.frame[2] > -0.01 for contact in contacts)
 
 
 SLOPE, FRICTION = np.radians(20.0), 0.8
