@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small maps and surveys for tests of surveys."""
 
-import errno
 import itertools
 import os
 import signal
@@ -90,8 +89,3 @@ def die_on_one(job: SurveyJob, chunk: Index) -> int | OSError:
     if chunk == (0, 1):
         os.kill(os.getpid(), signal.SIGKILL)
     return survey_chunk(job, chunk)
-
-
-def fill_the_disk(job: SurveyJob, chunk: Index) -> OSError:
-    """Find no room for a chunk."""
-    return OSError(errno.ENOSPC, "No room")

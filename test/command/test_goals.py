@@ -13,16 +13,12 @@ from rover_planner.errors import PlanningError
 from support.rovers import LSR1
 
 
-def by_intent(mission):
-    return {goal.intent: goal.pose for goal in mission.goals}
-
-
 def test_goals_are_what_they_say_and_plain_ones_and_the_start_stand_apart_on_known_ground():
     spirit, turn = load_terrain("spirit").fill_gaps(0.2), np.linspace(0.0, 2.0 * np.pi, 20)
     around = 0.5 * swing_radius(LSR1)
     for seed in (1, 2):
         mission = choose_mission(spirit, LSR1, seed)
-        places = by_intent(mission)
+        places = {goal.intent: goal.pose for goal in mission.goals}
         assert not spirit.contains(*places["off the map"][:2])
         unknown = places["unknown ground"][:2]
         assert spirit.contains(*unknown) and np.isnan(spirit.elevation_at(*unknown))
@@ -39,7 +35,8 @@ def test_goals_are_what_they_say_and_plain_ones_and_the_start_stand_apart_on_kno
 
 
 def test_a_map_smaller_than_the_rover_is_refused():
-    level = by_intent(choose_mission(Terrain(np.zeros((40, 40)), 0.05), LSR1))
+    mission = choose_mission(Terrain(np.zeros((40, 40)), 0.05), LSR1)
+    level = {goal.intent for goal in mission.goals}
     assert "off the map" in level and "unknown ground" not in level
     with pytest.raises(PlanningError, match="no place"):
         choose_mission(Terrain(np.zeros((8, 8)), 0.1), LSR1)

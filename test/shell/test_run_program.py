@@ -46,11 +46,6 @@ def test_every_error_is_an_exit_code_and_at_most_one_line(capfd, error, code, li
     assert capfd.readouterr().err == line
 
 
-def test_a_number_that_is_returned_is_the_exit_code():
-    results = {None: EXIT_OK, 3: 3, "x": EXIT_OK}
-    assert [run_program("rover", lambda one=one: one) for one in results] == [*results.values()]
-
-
 def test_a_warning_of_a_library_is_not_printed_unless_a_filter_asks_for_it(capfd):
     def warn():
         warnings.warn("overflow", RuntimeWarning, stacklevel=1)

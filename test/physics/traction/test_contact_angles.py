@@ -81,25 +81,12 @@ def test_at_the_foot_of_a_face_it_is_the_face_that_counts():
     pose = np.array([-0.4 - 0.1, 0.0, 0.3, 0.0])
     face = np.arctan2(0.16, 0.04)  # it rises over two cells
     level = MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.zeros(6))
-    angles = MapContactFinder(LSR1, ground).find(level, pose, 0.0).angles
+    finder = MapContactFinder(LSR1, ground)
+    angles = finder.find(level, pose, 0.0).angles
+    back = finder.find(level, pose, 0.0, directions=-1.0).angles
     assert angles[[2, 5]] == pytest.approx(np.full(2, face), abs=0.02)
     assert angles[[0, 1, 3, 4]] == pytest.approx(np.zeros(4), abs=0.02)
-    back = MapContactFinder(LSR1, ground).find(level, pose, 0.0, directions=-1.0).angles
     assert back == pytest.approx(np.zeros(6), abs=0.02)
-
-
-def test_an_estimate_stays_as_it_is_when_the_next_one_is_made():
-    ground = fractal(1)
-    prediction, motions, duration = drive_states(LSR1, ground)
-    finder, estimator = MapContactFinder(LSR1, ground), MotionContactEstimator(LSR1)
-    estimates = []
-    for i in (400, 700):
-        pose = np.array([*prediction.position[i], 0.0])
-        found = finder.find(state_of(LSR1, prediction, i), pose, 0.0)
-        estimates.append((found, estimator.update(motions[i], duration)))
-    for one, other in zip(*estimates, strict=True):
-        assert not np.shares_memory(one.angles, other.angles)
-        assert not np.shares_memory(one.covariance, other.covariance)
 
 
 def test_ground_that_the_map_does_not_have_is_refused_by_wheel():

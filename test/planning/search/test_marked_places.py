@@ -40,12 +40,8 @@ PLACE = MarkedPlace(1.5, 0.0, 0.4, "wheels turn and the rover stays", "2026-11-2
 START, GOAL = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
 
 
-@pytest.fixture
-def service():
-    return make_service(plane(0.0, 0.0, half=4.0), planner=AUTO, search_budget=60.0)
-
-
-def test_until_it_is_cleared_a_marked_place_refuses_paths_and_answers_lead_around_it(service):
+def test_until_it_is_cleared_a_marked_place_refuses_paths_and_answers_lead_around_it():
+    service = make_service(plane(0.0, 0.0, half=4.0), planner=AUTO, search_budget=60.0)
     service.mark(PLACE)
     service.given_path = GivenPath(poses_at(np.linspace(0.0, 3.0, 40)), "")
     judged = service.given_path.judge(service.snapshot())
@@ -60,15 +56,6 @@ def test_until_it_is_cleared_a_marked_place_refuses_paths_and_answers_lead_aroun
     assert judged.candidate.verdict.failure_chance == 0.0  # it is asked of this path, too
     service.marked = NONE_MARKED
     assert np.abs(service.snapshot().answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
-
-
-def test_a_goal_in_a_marked_place_is_answered_with_one_near_it(service):
-    service.mark(MarkedPlace(1.0, 0.0, 0.3, "stuck there", "today"))
-    assert not service.snapshot().answer((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)).traversable
-    near = service.snapshot().answer((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), tolerance=0.8)
-    assert near.traversable and 0.3 < near.search.goal_offset <= 0.8
-    end = near.candidate.poses[-1]
-    assert np.hypot(end[0] - 1.0, end[1]) == pytest.approx(near.search.goal_offset)
 
 
 def test_a_search_is_told_at_once_that_its_goal_is_in_a_marked_place():
