@@ -73,6 +73,20 @@ def test_a_node_outlives_errors_of_timers_subscriptions_and_services(ros, has_lo
     wait_until(lambda: node.ticks > ticks + 2, "the timer")
 
 
+def test_an_entity_that_cannot_be_read_does_not_block_the_node(ros):
+    node = Fragile(ros.context)
+    executor = GuardedExecutor(context=ros.context)
+    executor.add_node(node)
+
+    def fail(_):
+        raise MemoryError("no room for the message")
+
+    executor._make_handler(next(iter(node.subscriptions)), node, fail)()
+    assert node.default_callback_group.can_execute(node.timer)  # rclpy's own blocks it for ever
+    executor.shutdown()
+    node.destroy_node()
+
+
 class CountingExecutor(GuardedExecutor):
     """Counts its wait sets: each asks once for the timer."""
 
