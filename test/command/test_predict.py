@@ -196,7 +196,6 @@ def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monke
         ({"assumptions": np.float64(1.0)}, "assumptions is of type float64; it must hold texts"),
         ({"roll": np.float64(1.0)}, r"roll has shape \(\); it must be \(30,\)"),
         ({"settled": np.zeros(N)}, "settled is of type float64; it must hold bools"),
-        ({"reason": np.zeros(N)}, "reason is of type float64; it must hold texts"),
         ({"position": np.full((N, 3), np.nan)}, "position has a value that is NaN or beyond"),
     ],
 )

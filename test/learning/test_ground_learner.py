@@ -217,6 +217,12 @@ def test_a_row_that_another_one_has_overtaken_begins_no_other_drive():
     assert found == expected and found.low > 0.0
 
 
+def test_nothing_is_learned_from_rows_without_a_pose():
+    rows = climb(ROVER, SLOPE, 5.0)
+    rows[:, YAW] = np.nan
+    assert learn(rows).window is None
+
+
 @pytest.mark.parametrize(
     ("sensors", "spoil", "word"),
     [

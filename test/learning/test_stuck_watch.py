@@ -41,14 +41,6 @@ def test_a_rover_that_stands_while_its_wheels_turn_or_push_is_stuck_within_two_s
     assert noticed is not None and noticed <= 2.0
 
 
-def test_a_rover_whose_wheels_stand_and_then_spin_is_stuck_from_when_it_stands():
-    watch = StuckWatch(SPEED, MAX_TORQUE)
-    for time in PERIOD * np.arange(1, 20):
-        one = window(float(time), 0.0, 0.0 if time < 1.0 else SPEED)
-        stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
-        assert stuck == (time > 1.25)
-
-
 def test_a_rover_that_creeps_rests_or_climbs_is_not_stuck():
     for rolling in (SPEED, 0.2 * SPEED):
         assert first_notice(0.2 * SPEED, rolling, MAX_TORQUE) is None
@@ -56,39 +48,37 @@ def test_a_rover_that_creeps_rests_or_climbs_is_not_stuck():
     assert first_notice(0.0, SPEED, 1.0, climb=0.05) is None
 
 
-def test_a_rover_that_slides_back_while_its_wheels_turn_is_stuck_within_two_seconds():
+def turn_on_the_spot(time: float) -> SlipWindow:
+    around = 0.15 * time + np.arange(6.0)
+    places = 0.4 * np.column_stack([np.cos(around), np.sin(around)])
+    return replace(window(time, 0.0, SPEED), places=places)
+
+
+def turn_back(time: float, turn: float = 3.05, back: float = 0.85) -> SlipWindow:
+    after = np.clip((time - turn) / (0.5 * DURATION), -1.0, 1.0)
+    share = back if after > 0.0 else 1.0
+    return window(time, SPEED * share * abs(time - turn), SPEED * share * after)
+
+
+def slide_back(time: float) -> SlipWindow:
+    back = -0.3 * SPEED
+    return replace(window(time, back * time, SPEED), travel=np.full(6, back))
+
+
+@pytest.mark.parametrize(
+    ("move", "commanded", "since"),
+    [
+        (turn_on_the_spot, None, np.inf),
+        (turn_back, None, np.inf),
+        (lambda time: window(time, 0.0, 0.2 * SPEED, scrub=0.25 * SPEED), None, np.inf),
+        (slide_back, None, 1.25),
+        (lambda time: window(time, 0.0, SPEED * (time >= 1.0)), SPEED, 1.25),
+        (lambda time: window(time, 0.0, 0.0, scrub=0.014 * (time < 2.6)), SPEED, 3.75),
+    ],
+    ids=["on the spot", "turns back", "steers", "slides back", "spins late", "stops steering"],
+)
+def test_a_rover_is_stuck_from_when_it_stands_or_slides_back(move, commanded, since):
     watch = StuckWatch(SPEED, MAX_TORQUE)
-    for time in PERIOD * np.arange(1, 40):
-        slides = replace(
-            window(float(time), -0.3 * SPEED * time, SPEED), travel=np.full(6, -0.3 * SPEED)
-        )
-        stuck = watch.update(slides, np.ones(6), 0.0)
-        assert stuck == (time > 1.25)
-
-
-def test_a_rover_that_turns_back_is_not_stuck():
-    watch, turn, back = StuckWatch(SPEED, MAX_TORQUE), 3.05, 0.85
     for time in PERIOD * np.arange(1, 60):
-        after = np.clip((time - turn) / (0.5 * DURATION), -1.0, 1.0)
-        share = back if after > 0.0 else 1.0
-        one = window(float(time), SPEED * share * abs(time - turn), SPEED * share * after)
-        assert not watch.update(one, np.ones(6), 0.0)
-
-
-def test_a_rover_that_stands_while_its_wheels_are_steered_is_not_stuck():
-    watch = StuckWatch(SPEED, MAX_TORQUE)
-    for time in PERIOD * np.arange(1, 40):
-        one = window(float(time), 0.0, 0.0, scrub=0.014 if time < 2.6 else 0.0)
-        stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
-        assert stuck == (time > 3.75)
-
-
-def test_a_rover_that_turns_on_the_spot_or_steers_is_not_stuck():
-    turns, steers = StuckWatch(SPEED, MAX_TORQUE), StuckWatch(SPEED, MAX_TORQUE)
-    for time in PERIOD * np.arange(1, 60):
-        around = 0.15 * time + np.arange(6.0)
-        one = window(float(time), 0.0, SPEED)
-        places = 0.4 * np.column_stack([np.cos(around), np.sin(around)])
-        assert not turns.update(replace(one, places=places), np.ones(6), 0.0)
-        one = window(float(time), 0.0, 0.2 * SPEED, scrub=0.25 * SPEED)
-        assert not steers.update(one, np.ones(6), 0.0)
+        stuck = watch.update(move(float(time)), np.ones(6), 0.0, commanded=commanded)
+        assert stuck == (time > since)

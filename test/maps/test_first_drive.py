@@ -67,6 +67,12 @@ def test_the_first_drive_is_accepted_and_reaches_its_goal():
     assert names["elevation_cloud"] > 0 and names["footprint"] > 0 and names["contact"] > 0
 
 
+def test_without_the_footprint_the_start_is_unknown_ground():
+    for parameters in ({"fill_under_rover": False}, {"footprint_margin": 0.0}):
+        drive = Drive(**parameters)
+        assert drive.service.snapshot().answer(START, GOAL).code == "unknown_ground"
+
+
 def test_blind_ground_is_refused_where_the_parameter_says_so():
     drive = Drive(footprint_margin=MARGIN, blind_ground="refuse")
     refused = drive.service.snapshot().answer(START, GOAL)

@@ -83,9 +83,8 @@ def test_optimal_torques_keep_the_limit_with_the_resistance():
     assert bound.torque_saturation.max() <= 1.0 + 1e-3
 
 
-@pytest.mark.parametrize(("soil", "policy"), [(None, "equal"), ("dry_sand", "optimal")])
-def test_up_a_slope_backwards_is_as_forwards_of_the_rover_turned_round(soil, policy):
-    ground, options = plane(0.1, 0.05), SweepOptions(policy, soil=soil)
+def test_up_a_slope_backwards_is_as_forwards_of_the_rover_turned_round():
+    ground, options = plane(0.1, 0.05), SweepOptions("optimal", soil="dry_sand")
     poses, there = (poses_at([-0.5, 0.0, 0.5], yaw=yaw) for yaw in (0.0, np.pi))
     back = judge_path(LSR1, ground, there, replace(options, backward=True))[0]
     ahead = judge_path(turned_round(LSR1), ground, poses, options)[0]

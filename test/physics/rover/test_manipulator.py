@@ -14,6 +14,7 @@ from support.grounds import plane
 from support.rovers import LSR1, M2020
 
 ARM = LSR1.manipulator
+STIFF = replace(LSR1, manipulator=replace(ARM, joint_limits=((-3.2, 3.2), (-1, 1), (0, 2.5))))
 LEVEL, POSE = plane(0.0, 0.0), [[0.0, 0.0, 0.0]]
 
 
@@ -63,6 +64,7 @@ def test_joints_not_given_stay_stowed_and_names_of_others_are_passed_over():
     ("rover", "held", "said"),
     [
         (LSR1, {"angles": {"arm_elbow": np.nan}}, "arm_elbow"),
+        (STIFF, {"angles": {"arm_shoulder": 1.1}}, r"arm_shoulder.* 1\.1; .* within -1 to 1 rad"),
         (LSR1, {"payload": -0.1}, r"payload is .* 0 kg or more"),
         (LSR1, {"payload": np.nan}, r"payload is .* 0 kg or more"),
         (M2020, {"payload": 1.0}, "m2020.*no manipulator"),

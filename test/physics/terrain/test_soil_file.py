@@ -6,7 +6,7 @@ import math
 import pytest
 
 from rover_physics.errors import SoilError
-from rover_physics.terrain.soil_file import load_soils, soil_named, soils_from_dict
+from rover_physics.terrain.soil_file import load_soils, soils_from_dict
 from support.project.checkout import TOP
 
 DUNE = {
@@ -44,11 +44,6 @@ def test_a_coulomb_soil_may_leave_its_friction_to_the_map():
     assert (slab.name, slab.model, slab.source) == ("slab", "coulomb", "measured")
     assert slab.friction == 0.6 and math.isnan(slab.n)
     assert math.isnan(soils["ground"].friction)
-
-
-def test_an_unknown_soil_lists_the_soils_there_are():
-    with pytest.raises(SoilError, match="no soil 'dry_sandy'; did you mean dry_sand. soils are"):
-        soil_named("dry_sandy")
 
 
 COULOMB = {"model": "coulomb", "source": "s"}
