@@ -108,12 +108,3 @@ def lasting(monkeypatch):
 def server(start_server):
     """Return a traverse server without a map."""
     return start_server()
-
-
-@pytest.fixture
-def mapped(server, client):
-    """Return a traverse server that has a passable map."""
-    from support.grounds import make_terrain, waves
-
-    client.send_terrain(make_terrain(waves))
-    return server

@@ -25,6 +25,7 @@ from msg_adapters.paths import (
     stamped_pose,
     yaw_from_quaternion,
 )
+from rover_physics.numerics.quaternions import xyzw_from_rpy
 from support.messages import set_field
 
 
@@ -36,7 +37,10 @@ def test_place_and_heading_survive_a_message(yaw):
     np.testing.assert_allclose(path_to_poses(poses_path(poses, "map"), "map"), poses, atol=1e-15)
 
 
-def test_a_quaternion_of_rounded_numbers_has_its_heading():
+def test_the_heading_of_a_tilted_body_is_its_yaw():
+    for roll, pitch, yaw in np.random.default_rng(2).uniform(-1.2, 1.2, (20, 3)):
+        x, y, z, w = xyzw_from_rpy(roll, pitch, yaw).tolist()
+        assert yaw_from_quaternion(Quaternion(x=x, y=y, z=z, w=w)) == pytest.approx(yaw)
     assert yaw_from_quaternion(Quaternion(z=0.707, w=0.707)) == pytest.approx(math.pi / 2)
 
 

@@ -147,16 +147,17 @@ def test_a_wrong_parameter_of_ros_is_bad_input_and_a_signal_between_two_looks_an
 
 
 def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again(
-    mapped, endless, planner
+    server, endless, planner
 ):
     answers = []
+    server.service.take_terrain(make_terrain(waves))
     planner.wait_for_server()
     with endless():
         start, goal = (-2.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         ask = threading.Thread(target=lambda: answers.append(planner.ask(start, goal)))
         ask.start()
-        wait_until(lambda: mapped.desk.open_count == 1, "the question")
-        run_in_executor(mapped, lambda: mapped.desk.cancel(STOPPING, "it is shutting down"))
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        run_in_executor(server, lambda: server.desk.cancel(STOPPING, "it is shutting down"))
     ask.join(20.0)
     assert answers[0].traversable
 

@@ -22,6 +22,7 @@ def follow(rover, motions, duration):
     covariances = np.array([estimate.covariance for estimate in estimates])
     assert np.allclose(covariances, covariances.swapaxes(1, 2), atol=1e-12)
     assert np.linalg.eigvalsh(covariances).min() > 0.0
+    assert not np.array_equal(covariances[0], covariances[-1])  # each estimate keeps its own
     angles = np.array([estimate.angles for estimate in estimates])
     deviations = np.sqrt([np.diag(estimate.covariance) for estimate in estimates])
     return angles, deviations
