@@ -26,6 +26,12 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
     assert 0 < answer.chosen.passable_share == best < 1
 
 
+def test_a_goal_in_a_pit_is_answered_near_it():
+    pit = make_terrain(lambda x, y: -1.0 * ((abs(x - 2.0) < 0.4) & (abs(y) < 0.6)))
+    answer = PathJudge(Site(LSR1, pit, COARSE)).search((-1, 0, 0), (1.7, 0, 0), tolerance=1.0)
+    assert answer.traversable and 0.2 < answer.goal_offset <= 1.0
+
+
 @pytest.mark.parametrize("friction", [0.3, 0.8])
 def test_the_chosen_path_is_judged_at_all_its_waypoints(friction):
     options = PathQueryOptions(accepted_chance=1.0).change(friction=friction)
