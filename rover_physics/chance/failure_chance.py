@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from rover_physics.chance.samples import (
     PlacedSamples,
     change_heights,
-    cut_around,
     draw_samples,
     worst_of,
 )
@@ -41,7 +40,7 @@ from rover_physics.results.record import (
 from rover_physics.results.uses import find_uses
 from rover_physics.rover.extent import find_reach
 from rover_physics.status import PoseStatus, Stall
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, cut_around
 
 SAMPLES, PLACES = 32, 8
 """Number of samples, and of the places at which the rover is in them."""

@@ -4,7 +4,6 @@
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.rover.uncertainty import Uncertainty
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import new_ground, with_soils
-from rover_physics.terrain.layers import GRID_LAYERS
 
 DEVIATES = {
     "friction": 1,
@@ -170,25 +168,6 @@ def _sample(deviations: dict[str, Floats]) -> Sample:
         com=deviations["com"],
         error=held["model"],
     )
-
-
-def cut_around(terrain: Terrain, places: Floats, margin: float) -> Terrain:
-    """Return the part of a terrain within `margin` [m] of a box around places (n, 2) [m]."""
-    shape = np.array(terrain.elevation.shape[::-1])
-    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
-    first, last = (
-        np.clip(np.round((end - terrain.origin) / terrain.resolution), 0, shape - 1).astype(int)
-        for end in (low, high)
-    )
-    first = np.minimum(first, np.maximum(last - 1, 0))
-    columns, rows = (slice(a, b + 2) for a, b in zip(first, last, strict=True))
-    layers: dict[str, Any] = {
-        name: None if layer is None else np.ascontiguousarray(layer[rows, columns])
-        for name in GRID_LAYERS
-        for layer in (getattr(terrain, name),)
-    }
-    x, y = np.asarray(terrain.origin) + terrain.resolution * first
-    return replace(terrain, origin=(float(x), float(y)), **layers)
 
 
 def change_heights(model: PackedModel, part: Terrain, number: int) -> PackedModel:

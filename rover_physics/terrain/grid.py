@@ -14,7 +14,7 @@ from rover_physics.errors import RoverError, TerrainError
 from rover_physics.files.npz_file import write_npz
 from rover_physics.files.user_file import open_regular_file
 from rover_physics.files.validation import errors_of, show_file
-from rover_physics.numerics.arrays import freeze_array, seal_array
+from rover_physics.numerics.arrays import Floats, freeze_array, seal_array
 from rover_physics.terrain.checks import (
     as_elevation,
     as_origin,
@@ -196,6 +196,25 @@ class Terrain:
         column = (xs - self.origin[0]) / self.resolution
         row = (ys - self.origin[1]) / self.resolution
         return column, row
+
+
+def cut_around(terrain: Terrain, places: Floats, margin: float) -> Terrain:
+    """Return the part of a terrain within `margin` [m] of a box around places (n, 2) [m]."""
+    shape = np.array(terrain.elevation.shape[::-1])
+    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
+    first, last = (
+        np.clip(np.round((end - terrain.origin) / terrain.resolution), 0, shape - 1).astype(int)
+        for end in (low, high)
+    )
+    first = np.minimum(first, np.maximum(last - 1, 0))
+    columns, rows = (slice(a, b + 2) for a, b in zip(first, last, strict=True))
+    layers: dict[str, Any] = {
+        name: None if layer is None else np.ascontiguousarray(layer[rows, columns])
+        for name in GRID_LAYERS
+        for layer in (getattr(terrain, name),)
+    }
+    x, y = np.asarray(terrain.origin) + terrain.resolution * first
+    return replace(terrain, origin=(float(x), float(y)), **layers)
 
 
 def load_terrain(name_or_path: str | Path, max_cells: int = MAX_CELLS) -> Terrain:

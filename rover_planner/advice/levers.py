@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.chance.samples import cut_around
 from rover_physics.limits.table import LIMITS, Limit, Sense
 from rover_physics.names import OPTIMAL, SERVO
 from rover_physics.rover.extent import find_reach
 from rover_physics.rover.manipulator import arm_angles, link_points
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, cut_around
 from rover_physics.traversability.entrapment import MAX_LOOK_AHEAD
 from rover_planner.advice.case import MOST_FRICTION, Case, JudgedCase
 from rover_planner.advice.path_changes import (

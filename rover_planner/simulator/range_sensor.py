@@ -4,9 +4,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.chance.samples import cut_around
 from rover_physics.numerics.arrays import Floats
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, cut_around
 from rover_planner.angles import wrap
 from rover_planner.parameters.rover_simulator import ALL_AROUND, RoverSimulatorParameters
 

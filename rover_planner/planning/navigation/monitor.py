@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
 from rover_physics.rover.steering_joints import swing_radius
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, cut_around
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings

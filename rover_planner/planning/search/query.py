@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.chance.samples import cut_around
 from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.npz_file import open_npz
 from rover_physics.files.validation import errors_of, read_as
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.steering_joints import swing_radius
-from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.terrain.grid import Terrain, cut_around, load_terrain, save_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.maps.unobserved_ground import ALLOW, REFUSE, UNOBSERVED_CODE, ObservedGround
