@@ -16,12 +16,8 @@ import numpy as np
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
-from rover_planner.planning.path_geometry import (
-    MAX_WAYPOINTS,
-    count_steps,
-    dubins_paths,
-    path_length,
-)
+from rover_planner.planning.dubins import count_steps, dubins_paths
+from rover_planner.planning.path_geometry import MAX_WAYPOINTS, path_length
 
 MIN_RADIUS = 0.8
 """Default smallest radius of a candidate [m]: the wheelbase of the LSR-1 preset.

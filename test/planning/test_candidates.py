@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from rover_planner.angles import wrap
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import MIN_RADIUS, generate_candidates, turn_and_drive
-from rover_planner.planning.path_geometry import dubins_paths, path_length
+from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.path_geometry import path_length
 
 METRES = st.floats(-20.0, 20.0)
 ANGLES = st.floats(-2 * np.pi, 2 * np.pi)

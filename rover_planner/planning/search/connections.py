@@ -14,7 +14,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.angles import wrap
 from rover_planner.planning.candidates import turn_and_drive
-from rover_planner.planning.path_geometry import dubins_lengths, shortest_dubins_path
+from rover_planner.planning.dubins import dubins_lengths, shortest_dubins_path
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.search.edges import PRICES, Gear, Piece
 from rover_planner.planning.search.judge import PathJudge

@@ -18,7 +18,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.angles import wrap
 from rover_planner.planning.candidates import turn_on_the_spot
-from rover_planner.planning.path_geometry import count_steps, drive_word
+from rover_planner.planning.dubins import count_steps, drive_word
 from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, Nodes, opposite
 
 CURVES = {1: 2, 2: 1}

@@ -17,7 +17,8 @@ from rover_physics.rover.steering_joints import tightest_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import check_pose
-from rover_planner.planning.path_geometry import path_length, shortest_dubins_path
+from rover_planner.planning.dubins import shortest_dubins_path
+from rover_planner.planning.path_geometry import path_length
 from rover_planner.planning.path_query import Candidate, Pose, generate_paths
 from rover_planner.planning.search.connections import (
     MISSED_PRICE,
